@@ -9,7 +9,7 @@ use std::ops::Range;
 pub(crate) struct Grid {
     start: f64,
     end: f64,
-    /// As it was asked for, positive.
+    /// As it was asked for, positive; the span where that is longer than it.
     step: f64,
     /// The length of all elements but perhaps the last, signed.
     length: f64,
@@ -59,14 +59,14 @@ impl Grid {
         Ok(Self {
             start,
             end,
-            step: step.abs(),
+            step: step.abs().min((end - start).abs()),
             length,
             steps: steps as usize,
             whole: whole || steps == 1.0,
         })
     }
 
-    /// The step that was asked for, without its sign.
+    /// The step that was asked for, without its sign, and no longer than the span.
     pub(crate) fn step(&self) -> f64 {
         self.step
     }
@@ -159,6 +159,8 @@ mod tests {
             // A rounding for each of at most five additions.
             assert!((sum - (span.end - span.start)).abs() < 5.0 * 3.0 * f64::EPSILON);
             assert_eq!(grid.node(grid.steps()), span.end);
+            // What is plotted is a step that was made.
+            assert_eq!(grid.step(), step.min((span.end - span.start).abs()));
         }
     }
 

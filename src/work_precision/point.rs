@@ -37,7 +37,7 @@ pub struct Point {
     pub element: Element,
     /// How its equations were solved.
     pub solve: Solve,
-    /// The step, in the units of time, positive.
+    /// The step, in the units of time, positive; the span where a longer one was asked for.
     pub step: f64,
     /// The tolerance of its iteration.
     pub tolerance: f64,
