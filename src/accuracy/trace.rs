@@ -10,7 +10,7 @@ pub(crate) struct Trace {
     rows: Vec<f64>,
     /// How many events had changed the motion, at each row.
     acts: Vec<usize>,
-    /// The largest number of each kind so far, also between the rows.
+    /// The largest finite number of each kind so far, also between the rows.
     sizes: Vec<f64>,
 }
 
@@ -31,8 +31,7 @@ impl Trace {
     /// Looks at all numbers of one time, and keeps them as a row if they are to be compared.
     pub(crate) fn pass(&mut self, row: &[f64], acts: usize, keeps: bool) {
         for (size, kind) in self.sizes.iter_mut().zip(&self.kinds) {
-            let numbers = row[kind.clone()].iter();
-            *size = numbers.fold(*size, |size, x| size.max(x.abs()));
+            *size = largest(*size, &row[kind.clone()]);
         }
         if keeps {
             self.rows.extend_from_slice(row);
@@ -58,10 +57,8 @@ impl Trace {
     /// The largest number of each kind, those of a row included.
     pub(crate) fn sizes_with(&self, row: &[f64], sizes: &mut Vec<f64>) {
         sizes.clear();
-        sizes.extend(self.kinds.iter().zip(&self.sizes).map(|(kind, size)| {
-            let numbers = row[kind.clone()].iter();
-            numbers.fold(*size, |size, x| size.max(x.abs()))
-        }));
+        let kinds = self.kinds.iter().zip(&self.sizes);
+        sizes.extend(kinds.map(|(kind, size)| largest(*size, &row[kind.clone()])));
     }
 
     fn rows(&self) -> impl Iterator<Item = &[f64]> {
@@ -115,6 +112,12 @@ enum Side {
     Apart,
 }
 
+/// The largest magnitude beside what there is already. Beside an infinite one, as of 1/x at zero, all errors would be none.
+fn largest(so_far: f64, numbers: &[f64]) -> f64 {
+    let finite = numbers.iter().filter(|x| x.is_finite());
+    finite.fold(so_far, |largest, x| largest.max(x.abs()))
+}
+
 fn finite(x: f64) -> f64 {
     if x.is_finite() { x } else { f64::INFINITY }
 }
@@ -148,6 +151,16 @@ mod tests {
         let (mut a, b) = (trace(&[[1.0, 1e-9, 1.0]]), trace(&[[1.0, 0.0, 1.0]]));
         a.pass(&[1.0, 1.0, 1.0], 0, false);
         assert_eq!(difference(&a, &b)[1], [1e-9]);
+    }
+
+    #[test]
+    fn what_is_infinite_between_the_rows_is_no_scale() {
+        let (mut a, b) = (trace(&[[1.0, 1.0, 2.0]]), trace(&[[1.0, 1.0, 1.0]]));
+        a.pass(&[1.0, 1.0, f64::INFINITY], 0, false);
+        assert_eq!(difference(&a, &b)[2], [0.5]);
+        let mut sizes = Vec::new();
+        a.sizes_with(&[1.0, f64::NEG_INFINITY, 3.0], &mut sizes);
+        assert_eq!(sizes, [1.0, 1.0, 3.0]);
     }
 
     #[test]
