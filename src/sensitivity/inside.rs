@@ -36,6 +36,8 @@ impl Before {
 #[derive(Clone, Debug)]
 pub(crate) struct Inside {
     pub(crate) times: (f64, f64),
+    /// Between the times, to the digits of the step.
+    pub(crate) length: f64,
     /// By the start of the element and by its directions.
     pub(crate) slopes: InsideSlopes,
     pub(crate) before: Before,
@@ -79,6 +81,7 @@ impl Inside {
     #[cfg(feature = "sparse")]
     pub(crate) fn whole(
         times: (f64, f64),
+        length: f64,
         start: &DMatrix<f64>,
         coefficients: &DMatrix<f64>,
     ) -> Self {
@@ -86,6 +89,7 @@ impl Inside {
         let (size, columns) = start.shape();
         Self {
             times,
+            length,
             slopes: InsideSlopes {
                 start: rows(start),
                 coefficients: rows(coefficients),
@@ -162,8 +166,8 @@ impl Inside {
 
     /// Of (p, q) and q̇ at a time.
     pub(crate) fn at(&self, t: f64) -> Between {
-        let (n, length) = (self.coordinates(), self.times.1 - self.times.0);
-        let tau = (t - self.times.0) / length;
+        let (n, length) = (self.coordinates(), self.length);
+        let tau = (t - self.times.0) / (self.times.1 - self.times.0);
         let mut values = [0.0; MAX_NODES];
         legendre(tau, &mut values);
         let mut velocity = DMatrix::zeros(n, self.width());

@@ -349,6 +349,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             });
             inside.push(Inside {
                 times,
+                length: piece.length(),
                 slopes,
                 before: self.before.clone(),
                 ends: ends.map(<[f64]>::to_vec),

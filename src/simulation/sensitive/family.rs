@@ -109,7 +109,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                     to += DVector::from_column_slice(by);
                 }
                 let times = (element.t, element.t + element.h);
-                inside.push(Inside::whole(times, &current, &along));
+                inside.push(Inside::whole(times, element.h, &current, &along));
             }
             current = next;
             passed += 1;
