@@ -154,6 +154,22 @@ fn accuracy_is_met() {
     }
 }
 
+/// An element of twelve nodes is compared with two of half its length, also where another one is more than twice as long: estimates of the short ones were exactly zero.
+#[test]
+fn all_steps_are_halved_where_there_is_no_higher_order() {
+    let start = Pendulum.state([2.0], [0.0]);
+    let simulation = Simulation::new(&Pendulum).element(Mixed::<12>);
+    let nodes = (0..=20).map(|k| 1.2 * f64::from(k)).chain([26.5]);
+    let run = simulation.clone().nodes(nodes);
+    let motion = run.run_estimated(start, 0.0..26.5).expect("runs");
+    let before = motion.error_estimates().take(20);
+    let most = before.map(|(_, error)| error).fold(0.0, larger);
+    // By the poles of the motion at i·1.7 some 1e-16 a step.
+    assert!(0.0 < most && most < 1e-6, "{most:e}");
+    let empty = simulation.run_estimated(start, 1.0..1.0);
+    assert_eq!(empty.expect("nothing to do").error_estimate(), 0.0);
+}
+
 #[test]
 fn what_was_chosen_before_stays() {
     let start = Pendulum.state([2.0], [0.0]);

@@ -45,11 +45,17 @@ fn estimated<R: Repeatable<N>, const N: usize>(
             let mut stepper = run.stepper(more, control, false)?;
             return follow(run, &mut stepper, start, mesh, &times).map_err(|stop| stop.0);
         }
-        let nodes: Vec<f64> = [t0].iter().chain(&times).copied().collect();
-        let lengths = nodes.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-        let half = lengths.fold(0.0, larger) * (0.5 + 1e-9);
+        let starts = [t0].into_iter().chain(times.iter().copied());
+        // Of all elements, however long the longest is.
+        let halves = starts
+            .zip(&times)
+            .flat_map(|(t, next)| [t + 0.5 * (next - t), *next]);
+        let nodes: Vec<f64> = [t0].into_iter().chain(halves).collect();
         let mut stepper = run.stepper(Element::mixed(element.nodes()), control, false)?;
-        let mesh = run.even(&nodes, half)?;
+        let mesh = match times.is_empty() {
+            true => mesh.clone(),
+            false => run.through(&nodes)?,
+        };
         follow(run, &mut stepper, start, &mesh, &times).map_err(|stop| stop.0)
     };
     match other() {
