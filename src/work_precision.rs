@@ -179,7 +179,7 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
         self
     }
 
-    /// Several tolerances instead of one: each point takes the loosest that leaves its error within a quarter of that with the tightest, and
+    /// Several tolerances instead of one: each point takes the loosest that leaves its error within a quarter of that with the tightest that the iteration meets, and
     /// [names it](Point::tolerance). To iterate to round-off for an error of 1e-4 would waste time.
     #[must_use]
     pub fn tolerances(mut self, tolerances: impl IntoIterator<Item = f64>) -> Self {

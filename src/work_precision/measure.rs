@@ -60,7 +60,7 @@ impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
         advance::<M, S>(&mut self.stepper(way)?, grid, 0..grid.steps(), &mut state)
     }
 
-    /// Makes the run with each tolerance, the tightest first, and keeps the loosest that does not show in the error.
+    /// Makes the run with each tolerance, the tightest first, and keeps the loosest that does not show in the error beside the tightest that is met.
     pub(super) fn look_with(
         &self,
         way: Way<'_>,
@@ -75,10 +75,19 @@ impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
         };
         let mut sorted = tolerances.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let Some((tightest, looser)) = sorted.split_first() else {
+        let Some((tightest, mut looser)) = sorted.split_first() else {
             return with(way.control.tolerance);
         };
-        let best = with(*tightest);
+        let mut best = with(*tightest);
+        while best.1.is_err()
+            && let Some((next, rest)) = looser.split_first()
+        {
+            looser = rest;
+            let tried = with(*next);
+            if tried.1.is_ok() {
+                best = tried;
+            }
+        }
         let Ok(limit) = best.1.as_ref().map(|one| {
             let error = one.error().max(self.reference.uncertainty());
             SHOWS * error

@@ -402,3 +402,26 @@ fn other_integrators_stand_beside_families() {
         "{message}"
     );
 }
+
+/// A tolerance that so few iterations do not meet is no failure of a run that a looser one lets through.
+#[test]
+fn tolerances_that_are_not_met_are_left_out() {
+    let chain = chain(4);
+    let (q, v) = wave(4);
+    let with = |tolerances: &[f64]| {
+        let problem = WorkPrecision::new(&chain, chain.state(q.clone(), v.clone()), 0.0..2.0)
+            .element(Mixed::<4>)
+            .steps([0.25])
+            .solver(Solve::FixedPoint)
+            .max_iterations(5)
+            .tolerances(tolerances.iter().copied());
+        measure(problem)
+    };
+    let (tight, both) = (with(&[1e-15]), with(&[1e-3, 1e-15]));
+    assert!(tight.curves()[0].points()[0].outcome.is_err());
+    let point = &both.curves()[0].points()[0];
+    assert!(
+        point.outcome.is_ok() && point.tolerance == 1e-3,
+        "{point:?}"
+    );
+}
