@@ -319,7 +319,8 @@ impl<const N: usize> DenseElement<N> {
 /// The length of an element between two times that was made by the step `h`: the step if the times are as far apart but for rounding, which is a large part of a short step far
 /// from zero.
 pub(crate) fn length((start, end): (f64, f64), h: f64) -> f64 {
-    let rounding = 8.0 * f64::EPSILON * start.abs().max(end.abs()).max(h.abs());
+    // Steps begin and end at breaks some roundings short of them.
+    let rounding = 16.0 * f64::EPSILON * start.abs().max(end.abs()).max(h.abs());
     let between = end - start;
     if (between - h).abs() <= rounding {
         h
