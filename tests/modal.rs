@@ -91,7 +91,13 @@ fn frequencies_are_those_of_the_closed_form() {
 /// A run of one model that goes on with another one, of other frequencies, is that from its checkpoint on.
 #[test]
 fn modes_go_on_from_a_checkpoint_of_others() {
-    let (soft, stiff) = (row(8, 0.4), Row { k: 5.0, ..row(8, 0.4) });
+    let (soft, stiff) = (
+        row(8, 0.4),
+        Row {
+            k: 5.0,
+            ..row(8, 0.4)
+        },
+    );
     let soft: Modal<'_, Row, 3> = Modal::of(&soft).unwrap();
     let stiff: Modal<'_, Row, 3> = Modal::of(&stiff).unwrap();
     let start = State {

@@ -240,12 +240,11 @@ fn what_constraints_allow_is_that_of_parameters_set() {
     }
 
     let model = Carriage { m: 0.5 };
-    let simulation = Simulation::new(&model)
-        .element(Mixed::<8>)
-        .step(0.04)
-        .on("bottom", Crossing::Either, |_| {
-            Act::Set(Settings::new("m", 4.0))
-        });
+    let simulation = Simulation::new(&model).element(Mixed::<8>).step(0.04).on(
+        "bottom",
+        Crossing::Either,
+        |_| Act::Set(Settings::new("m", 4.0)),
+    );
     let moved = |s: f64| {
         let (sin, cos) = (0.9 + s).sin_cos();
         model.state([sin, -cos], [0.2 * cos, 0.2 * sin])

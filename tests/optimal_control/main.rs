@@ -467,11 +467,7 @@ fn graded_meshes_and_guesses_are_taken() {
 fn motions_end_where_they_were_asked_to() {
     let best = OptimalControl::of(&Sled)
         .elements(4)
-        .from_to(
-            Sled.state([0.0], [0.0]),
-            Sled.state([1.0], [0.0]),
-            0.2..0.9,
-        )
+        .from_to(Sled.state([0.0], [0.0]), Sled.state([1.0], [0.0]), 0.2..0.9)
         .running_cost("effort")
         .solve()
         .expect("a minimum");

@@ -34,10 +34,7 @@ fn branches_end_where_their_orbits_come_to_rest() {
     let of_energy = continuation().unknown_period(7.0);
     let of_period = continuation().period(|_| 7.0);
     // H = −k at rest, and T = 2π/√k.
-    for (continuation, rest) in [
-        (of_energy, 1.2_f64.cos()),
-        (of_period, (TAU / 7.0).powi(2)),
-    ] {
+    for (continuation, rest) in [(of_energy, 1.2_f64.cos()), (of_period, (TAU / 7.0).powi(2))] {
         let branch = continuation.run().expect("a branch");
         assert_eq!(branch.end(), Some(End::Rest));
         assert!(branch.events().is_empty());

@@ -125,9 +125,8 @@ fn second_derivatives_of_distances_do_not_cancel() {
         ("hypot(x/l, y)", 1.0 / l),
         ("hypot(x/4, y)", 1.0 / l),
     ] {
-        let text = format!(
-            "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - k*({distance} - l)"
-        );
+        let text =
+            format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - k*({distance} - l)");
         let parameters = [("k", 3.0), ("l", l)];
         let found = results_of(&text, &parameters, second, &[2.0, y], &[0.0; 2]);
         let h = 2.0 * share;

@@ -29,7 +29,10 @@ impl Inertia {
         }
         let zero = vec![0.0; model.len()];
         // Momenta have to be multiples of velocities.
-        if slope(model, NO_TIME, &zero, &zero).iter().any(|p| *p != 0.0) {
+        if slope(model, NO_TIME, &zero, &zero)
+            .iter()
+            .any(|p| *p != 0.0)
+        {
             return Err(ModelError::NotSecondOrder);
         }
         let second = diagonal(model, NO_TIME, &zero, &zero)?;
