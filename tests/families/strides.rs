@@ -22,6 +22,16 @@ struct Far {
     m: Vec<f64>,
 }
 
+/// [`Chain`] with indices that begin below zero, which generated loops count from zero.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in -2..n-2, dot(q[i+2])^2/2) - sum(i in -1..n-2, (q[i+2]-q[i+1])^2/2 + a/3*(q[i+2]-q[i+1])^3),
+)]
+struct Below {
+    n: usize,
+    a: f64,
+}
+
 /// Spoils what has been passed.
 struct Spoiler {
     q: Vec<f64>,
@@ -95,5 +105,41 @@ fn what_was_passed_is_done() {
     for n in [4, 3 * STRIDE] {
         let m = (0..n).map(|i| 1.0 + i as f64).collect();
         println!("{n}: {}", words(&Far { n, m }));
+    }
+}
+
+/// Of what the engine has made of a sum: the interpreter knows signs, generated loops do not.
+#[test]
+fn sums_that_begin_below_zero_have_all_their_turns() {
+    let a = 0.25;
+    for n in [2, 3, 17, STRIDE + 2] {
+        let q: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
+        let v: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).cos()).collect();
+        let (chain, below) = (Chain { n, a }, Below { n, a });
+        let energies = [
+            chain.energy_function(0.0, &q, &v),
+            below.energy_function(0.0, &q, &v),
+        ];
+        // Sums of some thousand terms of the size of one.
+        assert!(
+            (energies[0] - energies[1]).abs() < 1e-12 * n as f64,
+            "{energies:?}"
+        );
+        let mut forces = [vec![0.0; n], vec![0.0; n]];
+        let [one, other] = &mut forces;
+        chain.forces_inline(0.0, &q, &v, of_forces(one));
+        below.forces_inline(0.0, &q, &v, of_forces(other));
+        for (x, y) in forces[0].iter().zip(&forces[1]) {
+            assert!((x - y).abs() < 1e-14, "{x} {y}");
+        }
+    }
+}
+
+/// The rates of momenta alone.
+fn of_forces(by_q: &mut [f64]) -> Gradient<'_, f64> {
+    Gradient {
+        z: &mut [],
+        q: by_q,
+        force: &mut [],
     }
 }
