@@ -5,7 +5,7 @@ use super::mesh::Mesh;
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::Length;
-use crate::motion::{Checkpoint, Motion, Node, Reached, Seen};
+use crate::motion::{Checkpoint, Motion, Node, Reached};
 use std::ops::Range;
 
 impl Reached {
@@ -133,17 +133,15 @@ where
                     M::node(&mut stepper, &*self.model, at, &checkpoint.velocity)
                 }
             };
-            let mut before = checkpoint.clone();
-            if !is_same {
-                // Another model may see events on other sides.
-                before.seen = Seen::default();
-            }
-            Ok((place, before, stepper, Motion::starting(&*self.model, node)))
+            // Another model may see events on other sides.
+            let seen = is_same.then(|| checkpoint.seen.clone());
+            let seen = seen.unwrap_or_default();
+            Ok((place, seen, stepper, Motion::starting(&*self.model, node)))
         };
         let prepared = self.model.guarded(prepare);
         match prepared.unwrap_or_else(|| Err(RunErrorKind::panicked(time))) {
-            Ok(((mesh, done, origin), before, stepper, motion)) => {
-                let place = (&mesh, done, origin, Some(&before));
+            Ok(((mesh, done, origin), seen, stepper, motion)) => {
+                let place = (&mesh, done, origin, Some((&checkpoint.reached, seen)));
                 self.drive_on(motion, state, place, stepper, None)
             }
             Err(kind) => Err(self.refused(kind, (time, state))),

@@ -85,11 +85,12 @@ where
         &self,
         motion: Motion<N, L>,
         start: &L::State,
-        (mesh, done, origin, before): (&Mesh<N>, usize, f64, Option<&Checkpoint<N, L>>),
+        (mesh, done, origin, before): (&Mesh<N>, usize, f64, Option<(&Reached, Seen)>),
         mut stepper: L::Stepper<'m, M>,
         follower: Follower<'_, 'm, M, N, L>,
     ) -> Result<Motion<N, L>, RunError<N, L>> {
-        let mut seen = before.map_or_else(Seen::default, |one| one.seen.clone());
+        let (before, seen) = before.unzip();
+        let mut seen = seen.unwrap_or_default();
         let place = (mesh, done, &mut seen);
         let mut motion = self.drive_from(motion, start, place, &mut stepper, follower)?;
         if seen.has_stopped {
@@ -102,10 +103,10 @@ where
         let last = motion.last();
         // Where nothing was to be done the grid is that of before.
         let same = before.filter(|_| mesh.steps() == done);
-        let direction = before.map_or(0.0, |one| one.reached.direction);
+        let direction = before.map_or(0.0, |reached| reached.direction);
         let checkpoint = Checkpoint {
             reached: match same {
-                Some(before) => before.reached.clone(),
+                Some(reached) => reached.clone(),
                 None => Reached::new((origin, direction), self.step, mesh, last.t),
             },
             state: last.state(),
