@@ -234,6 +234,50 @@ fn powers_of_distances_at_zero() {
     }
 }
 
+/// Powers of squares with an exponent that is a field: the force −2 k c (k u)ᶜ⁻¹ x vanishes with u = x² + y² where c is one half or more.
+#[test]
+fn powers_of_squares_at_zero() {
+    for (square, k) in [
+        ("(x^2 + y^2)", 1.0),
+        ("(3*x^2 + 3*y^2)", 3.0),
+        ("(x^2)", 1.0),
+        ("(x^2/4)", 0.25),
+    ] {
+        let text =
+            format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - y^2/2 - {square}^c");
+        let of = |c: f64, q: &[f64]| results_of(&text, &[("c", c)], ALL, q, &[0.0; 2]);
+        for c in [0.5, 0.6, 0.75, 1.0, 1.5, 2.0] {
+            assert_eq!(of(c, &[0.0; 2]).q, [0.0; 2], "{square}^{c}");
+            let (x, y) = (3.0_f64, if square.contains('y') { 4.0 } else { 0.0 });
+            let found = of(c, &[x, y]);
+            let u = x * x + y * y;
+            let factor = -2.0 * c * k * (k * u).powf(c - 1.0);
+            close(found.q[0], factor * x, square);
+            let second = factor * (1.0 + 2.0 * (c - 1.0) * x * x / u);
+            // Of |x| it is a rounding.
+            if c > 0.5 {
+                close(found.qq[0][0], second, square);
+            }
+        }
+        // There the force is infinite.
+        assert!(of(0.4, &[0.0; 2]).q[0].is_nan(), "{square}");
+    }
+    let text = "coordinates(x), lagrangian = dot(x)^2/2 - (k*x^2)^c";
+    let of = |k: f64, x: f64| results_of(text, &[("k", k), ("c", 0.7)], ALL, &[x], &[0.0]).q[0];
+    assert_eq!(of(2.0, 0.0), 0.0);
+    assert!(of(-2.0, 1.0).is_nan());
+    let text = "coordinates(x), lagrangian = dot(x)^2/2 - (k*x^2)^0.7";
+    let of = |k: f64, x: f64| results_of(text, &[("k", k)], ALL, &[x], &[0.0]).q[0];
+    assert_eq!(of(2.0, 0.0), 0.0);
+    assert!(of(-2.0, 1.0).is_nan());
+    // Derivatives of third degree beside a power.
+    let text = "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - x^2*(x^2 + y^2)^c";
+    for c in [0.5, 2.0] {
+        let found = results_of(text, &[("c", c)], ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.q, [0.0; 2], "{c}");
+    }
+}
+
 /// Nothing is chosen where nothing has a limit: distances that never vanish cost what they did.
 #[test]
 fn distances_without_limits_choose_nothing() {

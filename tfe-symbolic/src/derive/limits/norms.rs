@@ -98,9 +98,30 @@ fn part(graph: &Graph, x: ExprId, root: i32) -> Option<Vec<(ExprId, i32)>> {
 
 /// One where something that is never negative is zero, and itself elsewhere.
 fn one_where_zero(graph: &mut Graph, x: ExprId) -> ExprId {
-    let zero = graph.constant(Constant::ZERO);
     let one = graph.constant(Constant::ONE);
-    graph.select(Comparison::LessOrEqual, x, zero, one, x)
+    elsewhere(graph, x, one)
+}
+
+/// The same of a square below one of the xᵢ, as x (h²)ᵉ, whose product with that is zero with it: where the exponent is −½ or more.
+fn one_where_root_vanishes(graph: &mut Graph, square: ExprId, exponent: ExprId) -> ExprId {
+    let [zero, one, two] = [0, 1, 2].map(|number| graph.integer(number));
+    let half = graph.divide(one, two);
+    let least = graph.negate(half);
+    let at_zero = graph.select(Comparison::LessOrEqual, least, exponent, one, zero);
+    elsewhere(graph, square, at_zero)
+}
+
+/// Something else where a norm or its square is zero, and itself elsewhere. What parameters make negative is no square, and stays NaN in a power.
+fn elsewhere(graph: &mut Graph, x: ExprId, at_zero: ExprId) -> ExprId {
+    let zero = graph.constant(Constant::ZERO);
+    let is_parameter =
+        |input: &Input| matches!(input, Input::Parameter(_) | Input::ParameterElement(..));
+    let is_norm = matches!(graph.node(x), Node::Call { .. });
+    let size = match !is_norm && graph.inputs_of(x).iter().any(is_parameter) {
+        true => graph.call(Function::Abs, &[x]),
+        false => x,
+    };
+    graph.select(Comparison::LessOrEqual, size, zero, at_zero, x)
 }
 
 impl Norm {
@@ -250,8 +271,10 @@ impl Norm {
         let unknown = |(x, n): &(ExprId, i32)| match graph.node(*x) {
             Node::Power { base, exponent } if *n == 1 => {
                 let is_number = graph.as_constant(*exponent).is_some();
-                let is_own = Some(*base) == self.root || Some(*base) == self.square;
-                (is_own && !is_number).then_some((*x, *base, *exponent))
+                let (coefficient, inner) = graph.as_multiple(*base);
+                let is_own = Some(inner) == self.root || Some(inner) == self.square;
+                let is_known = is_number || coefficient.is_negative();
+                (is_own && !is_known).then_some((*x, *base, *exponent))
             }
             _ => None,
         };
@@ -287,13 +310,16 @@ impl Norm {
     }
 
     /// t hᵉ with an exponent that is not known: (t/hᵐ) hᵉ⁺ᵐ with t/hᵐ of degree zero. That is zero, or infinite, with the power alone.
+    ///
+    /// Of t (h²)ᵉ with t of odd degree, where no root of h² is at hand, one degree is left beside the power.
     fn limit_of_power(
         &self,
         graph: &mut Graph,
         (base, exponent): (ExprId, ExprId),
         factors: &[(ExprId, i32)],
     ) -> Option<ExprId> {
-        let is_root = Some(base) == self.root;
+        let inner = graph.as_multiple(base).1;
+        let is_root = Some(inner) == self.root;
         let (mut rest, mut shift) = (Vec::new(), 0);
         for (x, n) in factors {
             // In units of the root.
@@ -307,7 +333,7 @@ impl Norm {
                 rest.push((*x, *n));
                 continue;
             };
-            if *x != base && !self.is_plain {
+            if *x != base && !(self.is_plain && inner == base) {
                 return None;
             }
             shift += unit * i64::from(*n);
@@ -315,21 +341,34 @@ impl Norm {
         let degree = self.degree_of_product(graph, &rest, MAX_DEPTH);
         let above = degree as i64;
         let is_whole = degree == above as f64 && (0..=i64::from(u16::MAX)).contains(&above);
-        let is_divided = shift < 0 || (shift == 0 && !is_root && above >= 2);
+        let is_divided = shift < 0 || (shift == 0 && !is_root && above >= 1);
         if !is_whole || !is_divided {
             return None;
         }
-        let (divisor, times) = match (is_root, self.root) {
-            (false, _) if above % 2 == 0 => (base, above / 2),
-            (false, Some(root)) if self.is_plain => (root, above),
-            (true, _) => (base, above),
-            _ => return None,
+        let is_single = shift == 0 && above == 1;
+        let root = self.root.filter(|_| self.is_plain && inner == base);
+        let (divisor, times, left) = match (is_root, root) {
+            (true, _) => (base, above, 0),
+            (false, Some(root)) if above % 2 == 1 && !is_single => (root, above, 0),
+            (false, _) => (base, above / 2, above % 2),
         };
         let units = if is_root { 1 } else { 2 };
-        let shift = Constant::rational(i128::from(shift + above), units)?;
+        let added = Constant::rational(i128::from(shift + above - left), units)?;
         let (number, terms) = graph.terms(exponent);
-        let exponent = graph.linear(number + shift, &terms);
-        rest.push((graph.power(base, exponent), 1));
+        let number = number + added;
+        let mut raised = base;
+        if left == 1 {
+            // A potential (h²)⁻ᵉ has no limit.
+            let may_be_large = terms.iter().any(|(c, _)| !c.is_negative());
+            if !may_be_large || (is_single && !number.is_negative()) {
+                return None;
+            }
+        }
+        let exponent = graph.linear(number, &terms);
+        if left == 1 && number.is_negative() {
+            raised = one_where_root_vanishes(graph, base, exponent);
+        }
+        rest.push((graph.power(raised, exponent), 1));
         if times > 0 {
             let divisor = one_where_zero(graph, divisor);
             rest.push((divisor, -i32::try_from(times).ok()?));
