@@ -78,6 +78,20 @@ fn formulas_are_written_as_they_are_meant() {
         ("sin(x)^2", "(sin x)²"),
         ("3*(1/2)", "3·½"),
         ("x*(1/2)*y", "x ½ y"),
+        ("sin(x)*y", "sin(x) y"),
+        ("m*exp(t)*y*cos(x)", "m exp(t) y cos x"),
+        ("m*(g*sin(x))*y", "m g sin(x) y"),
+        ("-sin(x)*y", "−sin(x) y"),
+        ("sin(x)/x", "sin(x)/x"),
+        ("sin(x)/2*y", "½ sin(x) y"),
+        ("sin(x) + y", "sin x + y"),
+        ("dot(speed)^2", "(d/dt(speed))²"),
+        ("x/dot(speed)", "x/(d/dt(speed))"),
+        ("dot(x)^2*dot(speed)", "x\u{307}² d/dt(speed)"),
+        ("3/2*k*x^2", "3/2 k x²"),
+        ("2*sin(x)/2", "2 sin(x)/2"),
+        ("x/2/2", "½ x/2"),
+        ("x/2*y", "½ x y"),
     ] {
         assert_eq!(formula(&parsed(text)), expected);
     }

@@ -176,7 +176,7 @@ fn chain(expr: &Expr) -> (String, Tight) {
             ),
             BinaryOperator::Multiply => {
                 let right_text = at_least(right, Tight::Product);
-                let left = bracketed(text, own, Tight::Signed);
+                let left = closed(bracketed(text, own, Tight::Signed), left);
                 // Two numbers side by side would read as one.
                 let digit = |c: char| c.is_ascii_digit();
                 let digits = right_text.starts_with(digit)
@@ -195,12 +195,15 @@ fn chain(expr: &Expr) -> (String, Tight) {
                 (ExprKind::Number(one), ExprKind::Number(two)) if one == "1" && two == "2" => {
                     ("½".into(), Tight::Product)
                 }
-                (_, ExprKind::Number(two)) if two == "2" => (
-                    format!("½ {}", bracketed(text, own, Tight::Product)),
-                    Tight::Product,
-                ),
+                // `½ 3 x` would read as 3½ x.
+                (_, ExprKind::Number(two)) if two == "2" && !text.starts_with(char::is_numeric) => {
+                    (
+                        format!("½ {}", bracketed(text, own, Tight::Product)),
+                        Tight::Product,
+                    )
+                }
                 _ => {
-                    let left = bracketed(text, own, Tight::Signed);
+                    let left = closed(bracketed(text, own, Tight::Signed), left);
                     let quotient = format!("{left}/{}", at_least(right, Tight::Atom));
                     (
                         quotient,
@@ -231,6 +234,49 @@ fn chain(expr: &Expr) -> (String, Tight) {
     (text, own)
 }
 
+/// `sin θ` before another factor would be read as the sine of both: `sin(θ) x`.
+fn closed(text: String, expr: &Expr) -> String {
+    let Some((function, argument)) = last_call(expr) else {
+        return text;
+    };
+    let argument = formula(argument);
+    match text.strip_suffix(&format!("{function} {argument}")) {
+        Some(front) => format!("{front}{function}({argument})"),
+        None => text,
+    }
+}
+
+/// The function and its argument with which the text of a product ends, where it is written without brackets.
+fn last_call(expr: &Expr) -> Option<(&str, &Expr)> {
+    let mut last = expr;
+    loop {
+        last = match &last.node {
+            ExprKind::Negate(value) => value.as_ref(),
+            ExprKind::Binary {
+                operator: BinaryOperator::Multiply,
+                right,
+                ..
+            } => right.as_ref(),
+            // ½ stands in front.
+            ExprKind::Binary {
+                operator: BinaryOperator::Divide,
+                left,
+                ..
+            } => left.as_ref(),
+            ExprKind::Call {
+                function,
+                arguments,
+            } => {
+                return match &arguments[..] {
+                    [argument] => Some((function.node.as_str(), argument)),
+                    _ => None,
+                };
+            }
+            _ => return None,
+        };
+    }
+}
+
 /// `cos θ` next to an exponent would be read as `cos(θ²)`.
 fn is_call(expr: &Expr) -> bool {
     matches!(&expr.node, ExprKind::Call { function, .. } if function.node != "dot")
@@ -249,7 +295,7 @@ fn is_power(expr: &Expr) -> bool {
 
 fn called(function: &str, arguments: &[Expr]) -> (String, Tight) {
     match (function, arguments) {
-        ("dot", [argument]) => (rate(argument), Tight::Atom),
+        ("dot", [argument]) => rate(argument),
         ("norm", [argument]) => (format!("|{}|", formula(argument)), Tight::Atom),
         ("abs", [argument]) => (format!("|{}|", formula(argument)), Tight::Atom),
         ("inner", [a, b]) => (format!("⟨{}, {}⟩", formula(a), formula(b)), Tight::Atom),
@@ -267,8 +313,8 @@ fn called(function: &str, arguments: &[Expr]) -> (String, Tight) {
     }
 }
 
-/// A dot above a letter or an element of an array of that letter; `d/dt` before all else.
-fn rate(argument: &Expr) -> String {
+/// A dot above a letter or an element of an array of that letter; `d/dt` before all else, whose square is not that of the argument.
+fn rate(argument: &Expr) -> (String, Tight) {
     let dotted = match &argument.node {
         ExprKind::Name(name) => dotted(name),
         ExprKind::Index { value, index } => match &value.node {
@@ -277,7 +323,10 @@ fn rate(argument: &Expr) -> String {
         },
         _ => None,
     };
-    dotted.unwrap_or_else(|| format!("d/dt({})", formula(argument)))
+    match dotted {
+        Some(dotted) => (dotted, Tight::Atom),
+        None => (format!("d/dt({})", formula(argument)), Tight::Product),
+    }
 }
 
 /// A coordinate or momentum by the name of [`names`](crate::model::declared::names): `θ₁`, `q[2]`.
