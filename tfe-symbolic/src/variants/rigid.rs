@@ -9,6 +9,7 @@ use crate::derive::constraint::{holds_state, kind, normal};
 use crate::diagnostic::{Kind, Role};
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::derivative;
+use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::{Constraint, ConstraintKind, Declared, Form};
@@ -55,7 +56,16 @@ impl Reduction {
             .map(|term| elongation(graph, form, *term, stiffness));
         let squares: Option<Vec<ExprId>> = squares.collect();
         match squares {
-            Some(squares) if constant.is_zero() && !squares.is_empty() => Ok(squares),
+            Some(squares) if constant.is_zero() && !squares.is_empty() => {
+                let is_flat = |square: &ExprId| has_no_slope(graph, *square);
+                let flat = squares.iter().copied().find(is_flat);
+                let Some(flat) = flat else {
+                    return Ok(squares);
+                };
+                let flat = super::notation::text(&self.model, flat);
+                let flat = flat.unwrap_or_else(|| "the elongation".to_owned());
+                Err(wrong(format!("{flat} has no slope where it is zero")))
+            }
             _ => {
                 let slope = super::notation::text(&self.model, slope);
                 let slope = slope.unwrap_or_else(|| "no such square".to_owned());
@@ -154,6 +164,41 @@ fn elongation(
     let inputs = graph.inputs_of(root);
     let is_position = !inputs.iter().any(moves) && !inputs.contains(stiffness);
     (is_position && holds_state(graph, root)).then_some(root)
+}
+
+/// Whether a constraint has a row of zeros, or of zero over zero, where it holds: the elongation of a one-sided spring, as max(x, 0), or a sum of squares.
+fn has_no_slope(graph: &mut Graph, elongation: ExprId) -> bool {
+    let mapping = graph.with_nodes(elongation, &mut |graph, old, mapping| {
+        let branches = match graph.node(old) {
+            Node::Select {
+                then, otherwise, ..
+            } => [*then, *otherwise],
+            Node::Call {
+                function: Function::Min | Function::Max,
+                arguments,
+            } => [*arguments.first()?, *arguments.get(1)?],
+            _ => return None,
+        };
+        let mut branches = branches.into_iter().map(|branch| mapping.of(branch));
+        branches.find(|branch| !holds_state(graph, *branch))
+    });
+    let slack = mapping.of(elongation);
+    if graph.as_constant(slack).is_some_and(Constant::is_zero) {
+        return true;
+    }
+    if let Node::Call {
+        function: Function::Hypot,
+        ..
+    } = graph.node(elongation)
+    {
+        return true;
+    }
+    let (constant, terms) = graph.terms(elongation);
+    let is_square = |(c, x): &(Constant, ExprId)| match graph.node(*x) {
+        Node::Product(factors) => !c.is_negative() && factors.iter().all(|(_, n)| n % 2 == 0),
+        _ => false,
+    };
+    constant.is_zero() && terms.iter().all(is_square)
 }
 
 fn greatest_common_divisor(a: i32, b: i32) -> i32 {
