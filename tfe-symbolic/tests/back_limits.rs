@@ -278,6 +278,28 @@ fn powers_of_squares_at_zero() {
     }
 }
 
+/// Sums each of which stands twice in the next: 2³⁸ paths lead through them, which nothing goes along one by one.
+#[test]
+fn nested_lets_are_read_once() {
+    let mut lets = "let u0 = x, let v0 = y, ".to_owned();
+    for next in 1..=38 {
+        let known = next - 1;
+        lets += &format!("let u{next} = u{known}/3 + 2*v{known}/3, ");
+        lets += &format!("let v{next} = 2*u{known}/3 + v{known}/3, ");
+    }
+    let text = format!(
+        "coordinates(x, y), {lets} lagrangian = (dot(x)^2 + dot(y)^2)/2 - (u38^2 + v38^2)^1.5 - cos(u20) - 1/(5 + u38)"
+    );
+    let found = results_of(&text, &[], ALL, &[0.0; 2], &[0.0; 2]);
+    close(found.q[0], 0.02, "by x at zero");
+    // uₙ = (x + y)/2 + 3⁻ⁿ (x − y)/2 for even n, vₙ with the other sign
+    let found = results_of(&text, &[], ALL, &[3.0, 1.0], &[0.0; 2]);
+    let small = 3_f64.powi(-20);
+    let slope = (2.0 + small).sin() * (1.0 + small) / 2.0;
+    let expected = -6.0 * 8_f64.sqrt() + slope + 0.5 / 49.0;
+    close(found.q[0], expected, "by x");
+}
+
 /// Nothing is chosen where nothing has a limit: distances that never vanish cost what they did.
 #[test]
 fn distances_without_limits_choose_nothing() {

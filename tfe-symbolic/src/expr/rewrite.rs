@@ -2,11 +2,15 @@
 
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node, SumRange, TooLong};
-use crate::expr::hash::Map;
+use crate::expr::hash::{Map, Set};
 use crate::expr::input::{Affine, IndexSymbol, Input, LoopVariable};
+use crate::expr::sorting::sort;
 
 /// The most terms that [`Graph::unroll`] writes out, over all sums of an expression.
 pub(crate) const UNROLL_LIMIT: u64 = 4096;
+
+/// Terms are collected along so many paths through sums inside of sums one by one, which is faster where few are shared.
+const MAX_PATHS: usize = 1 << 14;
 
 /// Old expressions and what became of those that changed; lookups only.
 #[derive(Default)]
@@ -148,8 +152,13 @@ impl Graph {
         let mut constant = Constant::ZERO;
         let mut terms = Vec::new();
         let mut waiting = vec![(Constant::ONE, id)];
-        while let Some((factor, id)) = waiting.pop() {
-            let (factor, inner) = self.as_multiple_times(factor, id);
+        let mut steps = 0;
+        while let Some((factor, at)) = waiting.pop() {
+            steps += 1;
+            if steps > MAX_PATHS {
+                return self.terms_of_shared(id);
+            }
+            let (factor, inner) = self.as_multiple_times(factor, at);
             match (self.as_sum(inner), self.as_constant(inner)) {
                 (Some((own, inner)), _) => {
                     constant = constant + factor * own;
@@ -158,6 +167,60 @@ impl Graph {
                 }
                 (None, Some(value)) => constant = constant + factor * value,
                 (None, None) => terms.push((factor, inner)),
+            }
+        }
+        (constant, terms)
+    }
+
+    /// The same where sums stand in several others, on whose paths they would be opened again and again: each is opened once, and like terms are one.
+    fn terms_of_shared(&self, id: ExprId) -> (Constant, Vec<(Constant, ExprId)>) {
+        let mut order = Vec::new();
+        let mut met: Set<ExprId> = Set::default();
+        let mut waiting = vec![id];
+        while let Some(x) = waiting.pop() {
+            if met.insert(x) {
+                order.push(x);
+                if let Node::Sum { terms, .. } = self.node(x) {
+                    waiting.extend(terms.iter().rev().map(|(_, y)| *y));
+                }
+            }
+        }
+        // Children come before their parents.
+        let mut parents_first = order.clone();
+        sort(&mut parents_first);
+        parents_first.reverse();
+        let mut factors: Map<ExprId, Constant> = Map::default();
+        factors.insert(id, Constant::ONE);
+        let mut constant = Constant::ZERO;
+        for x in parents_first {
+            let Node::Sum {
+                constant: own,
+                terms,
+            } = self.node(x)
+            else {
+                continue;
+            };
+            let Some(factor) = factors.get(&x).copied() else {
+                continue;
+            };
+            let in_range = |(c, _): &(Constant, ExprId)| factor.product_in_range(*c).is_some();
+            if !terms.iter().all(in_range) {
+                continue;
+            }
+            factors.remove(&x);
+            constant = constant + factor * *own;
+            for (c, y) in terms {
+                let before = factors.get(y).copied().unwrap_or(Constant::ZERO);
+                factors.insert(*y, before + factor * *c);
+            }
+        }
+        let mut terms = Vec::new();
+        for x in order {
+            let factor = factors.get(&x).copied().unwrap_or(Constant::ZERO);
+            match self.as_constant(x) {
+                Some(value) => constant = constant + factor * value,
+                None if factor.is_zero() => {}
+                None => terms.push((factor, x)),
             }
         }
         (constant, terms)
@@ -377,6 +440,41 @@ mod tests {
                 limit: UNROLL_LIMIT
             })
         );
+    }
+
+    #[test]
+    fn terms_of_sums_that_share_sums_are_collected() {
+        // u → u + 2v, v → 2u + v: over 2³⁸ paths.
+        let mut g = Graph::default();
+        let [x, y] = [0, 1].map(|k| q(&mut g, Affine::constant(k)));
+        let two = Constant::integer(2);
+        let (mut u, mut v) = (x, y);
+        for _ in 0..38 {
+            let next = |g: &mut Graph, a: ExprId, b: ExprId| {
+                g.linear(Constant::ZERO, &[(Constant::ONE, a), (two, b)])
+            };
+            (u, v) = (next(&mut g, u, v), next(&mut g, v, u));
+        }
+        let (constant, terms) = g.terms(u);
+        assert!(constant.is_zero());
+        // ((3ⁿ + (−1)ⁿ)/2, (3ⁿ − (−1)ⁿ)/2)
+        let power = 3_i64.pow(38);
+        let expected = [(power + 1) / 2, (power - 1) / 2].map(Constant::integer);
+        assert_eq!(terms.len(), 2);
+        for (c, leaf) in terms {
+            assert_eq!(c, expected[usize::from(leaf == y)]);
+        }
+        // 1/s − w/s² with s = (u + w) + 3v is (u + 3v)/s².
+        let w = q(&mut g, Affine::constant(2));
+        let (inner, three) = (g.add(u, w), Constant::integer(3));
+        let sum = g.linear(Constant::ZERO, &[(Constant::ONE, inner), (three, v)]);
+        let one = g.integer(1);
+        let below = g.divide(one, sum);
+        let share = g.product(Constant::ONE, &[(w, 1), (sum, -2)]);
+        let difference = g.subtract(below, share);
+        let rest = g.linear(Constant::ZERO, &[(Constant::ONE, u), (three, v)]);
+        let expected = g.product(Constant::ONE, &[(rest, 1), (sum, -2)]);
+        assert_eq!(difference, expected);
     }
 
     #[test]

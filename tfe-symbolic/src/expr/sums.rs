@@ -186,7 +186,9 @@ impl Collected {
             self.terms.remove(&part.partner);
             let mut factors = part.rest;
             factors.push(match part.left {
-                Left::Without { sum, term } => (without(graph, sum, term), 1),
+                Left::Without { sum, term } => {
+                    (without(graph, sum, term, &mut SortedMap::new()), 1)
+                }
                 Left::Square(x) => (x, 2),
             });
             let product = graph.product(Constant::ONE, &factors);
@@ -346,8 +348,16 @@ fn occurrences(
     count
 }
 
-/// A sum without one of its terms, which may stand in a sum within.
-fn without(graph: &mut Graph, sum: ExprId, term: ExprId) -> ExprId {
+/// A sum without one of its terms, which may stand in a sum within. Sums that stand in several others are looked into once.
+fn without(
+    graph: &mut Graph,
+    sum: ExprId,
+    term: ExprId,
+    made: &mut SortedMap<ExprId, ExprId>,
+) -> ExprId {
+    if let Some(known) = made.get(&sum) {
+        return *known;
+    }
     let Some((constant, terms)) = graph.as_sum(sum) else {
         return sum;
     };
@@ -358,11 +368,13 @@ fn without(graph: &mut Graph, sum: ExprId, term: ExprId) -> ExprId {
         }
         None => {
             for (_, x) in &mut left {
-                *x = without(graph, *x, term);
+                *x = without(graph, *x, term, made);
             }
         }
     }
-    graph.linear(constant, &left)
+    let rest = graph.linear(constant, &left);
+    made.insert(sum, rest);
+    rest
 }
 
 /// The factors of a product without those of one that is part of it.

@@ -40,6 +40,9 @@ const MAX_LOSS: f64 = 4.0;
 /// Arguments of sines are read as angles through so many nested sums.
 const MAX_DEPTH: usize = 24;
 
+/// Arguments of more parts are not read: sums that stand in several others are read on every path through these.
+const MAX_PARTS: usize = 4096;
+
 /// The states, and the results of the baseline at each of them.
 pub(crate) struct Guard {
     positions: Map<Input, usize>,
@@ -462,7 +465,7 @@ impl Angle {
                 | Input::Time,
             ) => {
                 self.parts.push((id, factor));
-                true
+                self.parts.len() <= MAX_PARTS
             }
             Node::Sum { constant, terms } => {
                 self.number += factor * constant.to_f64().abs();
