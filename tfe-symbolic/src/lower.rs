@@ -178,20 +178,21 @@ struct Index {
     start: Affine,
     end: Affine,
     /// What it is more than its variable, which begins at zero or above: programs have no loops below zero.
-    offset: i64,
+    offset: Affine,
     /// Its value, where the sum is written out turn by turn while it is lowered.
-    at: Option<i64>,
+    at: Option<Affine>,
 }
 
 impl Index {
     /// What the index stands for in formulas and in other indices.
     fn value(&self) -> Affine {
-        match self.at {
-            Some(at) => Affine::constant(at),
-            None => Affine {
-                constant: self.offset,
-                ..Affine::symbol(IndexSymbol::Loop(self.variable))
-            },
+        match &self.at {
+            Some(at) => at.clone(),
+            None => {
+                let variable = Affine::symbol(IndexSymbol::Loop(self.variable));
+                let value = self.offset.plus_scaled(&variable, 1);
+                value.unwrap_or(variable)
+            }
         }
     }
 }

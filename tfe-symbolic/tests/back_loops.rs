@@ -472,6 +472,14 @@ fn indices_that_begin_below_zero() {
             "sum(i in -9..N-9, sum(j in -3..i-1, k*q[i+9]*q[j+3]))",
             "sum(i in 0..N, sum(j in 0..i-7, k*q[i]*q[j]))",
         ),
+        (
+            "sum(i in 5-N..3, k*q[i+N-5]^3*(i + 1))",
+            "sum(i in 0..N-2, k*q[i]^3*(i + 6 - N))",
+        ),
+        (
+            "sum(i in 0..N, sum(j in i-N..0, k*q[i]*q[j+N]*j))",
+            "sum(i in 0..N, sum(j in i..N, k*q[i]*q[j]*(j - N)))",
+        ),
     ] {
         let [below, from_zero] = [below, from_zero].map(|sum| {
             format!("coordinates(q[N]), lagrangian = sum(i in 0..N, m/2*dot(q[i])^2) - {sum}")

@@ -277,7 +277,7 @@ impl Lowerer<'_> {
                      ..
                  }| {
                     let bound = |bound: &Affine| {
-                        let own = bound.plus_scaled(&Affine::constant(*offset), 1);
+                        let own = bound.plus_scaled(offset, 1);
                         self.in_words(own.as_ref().unwrap_or(bound))
                     };
                     format!("{name} in {}..{}", bound(start), bound(end))
@@ -293,16 +293,20 @@ impl Lowerer<'_> {
     }
 
     fn with_names(&self, affine: &Affine) -> Affine {
-        let mut constant = affine.constant;
+        let index_of = |symbol: &IndexSymbol| {
+            let mut indices = self.indices.iter();
+            indices.find(|x| *symbol == IndexSymbol::Loop(x.variable))
+        };
+        // The variable is the index less its offset.
+        let mut plain = affine.clone();
+        for (symbol, coefficient) in &affine.terms {
+            if let Some(index) = index_of(symbol) {
+                let less = plain.plus_scaled(&index.offset, coefficient.saturating_neg());
+                plain = less.unwrap_or(plain);
+            }
+        }
         let named = |(symbol, coefficient): &(IndexSymbol, i64)| {
-            let index = self
-                .indices
-                .iter()
-                .find(|x| *symbol == IndexSymbol::Loop(x.variable));
-            // The variable is the index less its offset.
-            let less = index.map_or(0, |index| coefficient.saturating_mul(index.offset));
-            constant = constant.saturating_sub(less);
-            let symbol = match (index, symbol) {
+            let symbol = match (index_of(symbol), symbol) {
                 (Some(index), _) => IndexSymbol::Field(index.name.clone()),
                 (None, IndexSymbol::Entry(list, place)) => {
                     IndexSymbol::Entry(list.clone(), self.with_names(place))
@@ -311,8 +315,10 @@ impl Lowerer<'_> {
             };
             (symbol, *coefficient)
         };
-        let terms = affine.terms.iter().map(named).collect();
-        Affine { constant, terms }
+        Affine {
+            constant: plain.constant,
+            terms: plain.terms.iter().map(named).collect(),
+        }
     }
 
     /// The side on which an index leaves its array whatever the generic lengths are; `None` if there may be lengths for which it

@@ -71,7 +71,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
-            offset: 0,
+            offset: Affine::default(),
             at: None,
         });
         let result = self.value(value);

@@ -145,7 +145,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
-            offset: 0,
+            offset: Affine::default(),
             at: None,
         });
         let value = self.scalar(value);

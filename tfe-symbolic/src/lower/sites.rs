@@ -128,7 +128,7 @@ impl Lowerer<'_> {
             variable,
             start,
             end,
-            offset: 0,
+            offset: Affine::default(),
             at: None,
         });
         self.require_turns(&sites);

@@ -48,7 +48,7 @@ impl Lowerer<'_> {
             .1
             .unwrap_or(Affine::symbol(IndexSymbol::Field("…".into())));
         let offset = self.below_zero(&start);
-        let from_zero = |bound: Affine| bound.plus_scaled(&Affine::constant(offset), -1);
+        let from_zero = |bound: Affine| bound.plus_scaled(&offset, -1);
         let (Some(start), Some(end)) = (from_zero(start), from_zero(end)) else {
             let number = range.start.to_string();
             self.report(whole, Kind::NumberTooLarge { number });
@@ -113,18 +113,23 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The least value of a bound, where that is known and below zero; else zero.
-    fn below_zero(&self, bound: &Affine) -> i64 {
-        let least = self.extreme(bound, false);
-        let least = least.and_then(|least| least.as_constant());
-        least.map_or(0, |least| least.min(0))
+    /// The least value of a bound, where that is below zero, or may be for large lengths; else zero.
+    fn below_zero(&self, bound: &Affine) -> Affine {
+        let least = self.extreme(bound, false).unwrap_or_default();
+        match least.as_constant() {
+            Some(least) => Affine::constant(least.min(0)),
+            None if least.terms.iter().any(|(_, factor)| *factor < 0) => least,
+            None => Affine::default(),
+        }
     }
 
     /// A sum over a literal range, lowered anew for each value of its index.
     fn each_turn(&mut self, (first, end): (i64, i64), index: &mut Index, body: &Expr) -> Value {
         let mut total: Option<Value> = None;
         for turn in first..end {
-            index.at = Some(turn.saturating_add(index.offset));
+            let here = Affine::constant(turn);
+            let value = index.offset.plus_scaled(&here, 1);
+            index.at = Some(value.unwrap_or(here));
             index.start = Affine::constant(turn);
             index.end = Affine::constant(turn + 1);
             self.indices.push(index.clone());
