@@ -187,21 +187,29 @@ impl Lowerer<'_> {
 
     /// The first name that stands for a momentum, or for a `let` that holds one.
     pub(super) fn momentum_in(&self, expr: &Expr) -> Option<Span> {
+        self.momentum_beside(expr, &mut vec![false; self.model.lets.len()])
+    }
+
+    /// The same, without `let`s in which none has been found.
+    fn momentum_beside(&self, expr: &Expr, without: &mut [bool]) -> Option<Span> {
         if let ExprKind::Name(name) = &expr.node
             && self.index(name).is_none()
         {
             return match self.symbol(name)? {
                 Symbol::Momentum(_) => Some(expr.span),
                 Symbol::Let(at) => {
-                    let (_, value) = self.model.lets.get(*at)?;
-                    self.momentum_in(value).map(|_| expr.span)
+                    let at = *at;
+                    if std::mem::replace(without.get_mut(at)?, true) {
+                        return None;
+                    }
+                    let (_, value) = self.model.lets.get(at)?;
+                    self.momentum_beside(value, without).map(|_| expr.span)
                 }
                 _ => None,
             };
         }
-        expr.children()
-            .into_iter()
-            .find_map(|child| self.momentum_in(child))
+        let mut children = expr.children().into_iter();
+        children.find_map(|child| self.momentum_beside(child, without))
     }
 
     /// The smallest part of an expression without sums that is not affine in the velocities.

@@ -109,7 +109,7 @@ impl Lowerer<'_> {
             self.report(whole, Kind::EmptyRange { range });
             return None;
         }
-        if start.as_constant().is_some_and(|start| start < 0) {
+        if begins_below_zero(&start) {
             let range = format!("{}..{}", range.start, range.end);
             self.report(whole, Kind::SitesBelowZero { range });
             return None;
@@ -204,6 +204,14 @@ impl Lowerer<'_> {
             value: row,
         });
         true
+    }
+}
+
+/// Whether a range begins below zero, for large lengths at least.
+fn begins_below_zero(start: &Affine) -> bool {
+    match start.as_constant() {
+        Some(start) => start < 0,
+        None => start.terms.iter().all(|(_, factor)| *factor < 0),
     }
 }
 
