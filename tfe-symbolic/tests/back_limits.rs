@@ -163,6 +163,43 @@ fn drag_at_rest() {
     }
 }
 
+/// Drag of one coordinate: forces |v|ᵐ v and their slope (m + 1) |v|ᵐ, and springs |x|ᶜ⁺¹/(c + 1), of which that with c = 1 is stiff at zero.
+#[test]
+fn powers_of_one_velocity_at_rest() {
+    for (force, scale, m, is_field) in [
+        ("abs(dot(x))^0.7*dot(x)", 1.0, 0.7, false),
+        ("abs(2*dot(x))^0.7*dot(x)", 2.0, 0.7, false),
+        ("abs(dot(x)/2)^0.3*dot(x)", 0.5, 0.3, false),
+        ("abs(dot(x))^(m-1)*dot(x)", 1.0, 0.0, true),
+        ("abs(dot(x))^(m-1)*dot(x)", 1.0, 0.5, true),
+        ("abs(dot(x))^(m-1)*dot(x)", 1.0, 1.0, true),
+        ("abs(dot(x))^(m-1)*dot(x)", 1.0, 2.0, true),
+    ] {
+        let text = format!("coordinates(x), lagrangian = dot(x)^2/2, force(x) = -c*{force}");
+        let mut parameters = vec![("c", 0.3)];
+        if is_field {
+            parameters.push(("m", m + 1.0));
+        }
+        let of = |v: f64| results_of(&text, &parameters, ALL, &[0.0], &[v]);
+        let slope = |v: f64| -0.3 * (m + 1.0) * (scale * v.abs()).powf(m);
+        for v in [3.0, -4.0, 2e-9] {
+            let found = of(v);
+            close(found.force[0], slope(v) / (m + 1.0) * v, force);
+            close(found.force_z[0][0], slope(v), force);
+        }
+        assert_eq!(of(0.0).force[0], 0.0, "{force}");
+        assert_eq!(of(0.0).force_z[0][0], slope(0.0), "{force} at rest");
+    }
+    for (c, x, expected) in [
+        (1.0, 0.0, (0.0, 1.0)),
+        (1.0, -4.0, (-4.0, 1.0)),
+        (2.0, 0.0, (0.0, 0.0)),
+        (2.0, -4.0, (-16.0, 8.0)),
+    ] {
+        check_slopes("abs(x)^(c+1)/(c+1)", &[("c", c)], x, expected);
+    }
+}
+
 /// What moves against a stream, and a point on an arm: norms of sums and of products.
 #[test]
 fn drag_of_relative_velocities() {

@@ -89,7 +89,7 @@ impl Graph {
         coefficient
     }
 
-    /// x sign x → abs x and abs(x) sign x → x, and even powers of a sign beside them → 1. Whether there was one.
+    /// x sign x → abs x and abs(x) sign x → x, and even powers of a sign beside them, or beside abs(x)ᵉ, → 1. Whether there was one.
     fn fold_signs(&mut self, collected: &mut SortedMap<ExprId, i64>) -> bool {
         let sign_of = |(x, n): &(ExprId, i64)| match self.node(*x) {
             Node::Call {
@@ -106,7 +106,18 @@ impl Graph {
                 arguments: vec![argument],
             };
             let stands = |size: &ExprId| collected.get(size).is_some_and(|m| *m > 0);
-            let beside = self.find(&size).filter(stands);
+            let known = self.find(&size);
+            let beside = known.filter(stands);
+            let is_power = |(x, m): &(ExprId, i64)| match self.node(*x) {
+                Node::Power { base, .. } => *m > 0 && Some(self.as_multiple(*base).1) == known,
+                _ => false,
+            };
+            if n > 1 && beside.is_none() && collected.iter().any(is_power) {
+                // One also where x = 0: abs(x)ᵉ sign² is the second derivative of a power of which the limit is meant.
+                *collected.get_or_default(sign) = n % 2;
+                is_folded = true;
+                continue;
+            }
             if let Some(size) = beside {
                 if n % 2 != 0 {
                     *collected.get_or_default(size) -= 1;
@@ -131,7 +142,7 @@ impl Graph {
         is_folded
     }
 
-    /// xᵉ/xⁿ → xᵉ⁻ⁿ for a number e that is not whole.
+    /// xᵉ/xⁿ → xᵉ⁻ⁿ for a number e that is not whole, and (c x)ᵉ xⁿ → (c x)ᵉ⁺ⁿ/cⁿ where e is below zero, or e − 1 and the like: the same numbers, and the limit at zero.
     fn merge_powers(
         &mut self,
         collected: &mut SortedMap<ExprId, i64>,
@@ -139,24 +150,50 @@ impl Graph {
     ) {
         let power_of = |(x, n): &(ExprId, i64)| match self.node(*x) {
             Node::Power { base, exponent } if *n > 0 => {
-                let exponent = self.as_constant(*exponent)?;
-                let is_whole = exponent.as_integer().is_some();
-                (!is_whole).then_some((*x, *n, *base, exponent))
+                let number = self.as_constant(*exponent);
+                let is_whole = number.is_some_and(|number| number.as_integer().is_some());
+                (!is_whole).then_some((*x, *n, *base, *exponent))
             }
             _ => None,
         };
-        let powers: Vec<(ExprId, i64, ExprId, Constant)> =
+        let powers: Vec<(ExprId, i64, ExprId, ExprId)> =
             collected.iter().filter_map(power_of).collect();
         for (power, n, base, exponent) in powers {
-            let below = collected.get(&base).copied().unwrap_or_default();
-            if below < 0 {
-                *collected.get_or_default(base) = 0;
+            let (scale, x) = self.as_multiple(base);
+            let beside = collected.get(&x).copied().unwrap_or_default();
+            if beside == 0 {
+                continue;
+            }
+            let number = self.as_constant(exponent);
+            let (own, terms) = match number {
+                Some(number) => (number * Constant::integer(n), Vec::new()),
+                None => self.terms(exponent),
+            };
+            let is_merged = match number {
+                Some(_) if beside < 0 => scale.is_one(),
+                _ => {
+                    let is_one_power = number.is_some() || n == 1;
+                    beside > 0 && is_one_power && own.is_negative() && self.may_vanish(x)
+                }
+            };
+            if is_merged {
+                *collected.get_or_default(x) = 0;
                 *collected.get_or_default(power) = 0;
-                let exponent = exponent * Constant::integer(n) + Constant::integer(below);
-                let exponent = self.constant(exponent);
+                let exponent = self.linear(own + Constant::integer(beside), &terms);
                 waiting.push((self.power(base, exponent), 1));
+                if !scale.is_one() {
+                    waiting.push((self.constant(scale), -beside));
+                }
             }
         }
+    }
+
+    /// Whether it is no parameter: these count as positive.
+    fn may_vanish(&self, x: ExprId) -> bool {
+        !matches!(
+            self.node(x),
+            Node::Input(Input::Parameter(_) | Input::ParameterElement(..))
+        )
     }
 
     /// The factors of an expression with their exponents.
@@ -201,12 +238,7 @@ impl Graph {
             let here = collected.get(x).copied().unwrap_or_default();
             here >= i64::from(*n)
         };
-        let may_vanish = |(x, _): &(ExprId, i32)| {
-            !matches!(
-                self.node(*x),
-                Node::Input(Input::Parameter(_) | Input::ParameterElement(..))
-            )
-        };
+        let may_vanish = |(x, _): &(ExprId, i32)| self.may_vanish(*x);
         if !above.clone().all(stands_above) || !above.any(may_vanish) {
             return None;
         }

@@ -9,10 +9,10 @@
 //! | r·uⁿ⁺¹ − c·r·uⁿ·w | → r·uⁿ·(u − c·w), where c·w is a term of u, a sum with positive coefficients, and n < 0: 1/√(x² + y²) − x²/√(x² + y²)³ → y²/√(x² + y²)³, and with hypot(x, y) for the root |
 //! | products | x·0 → 0, x·1 → x; numbers come out in front; x·x → x², xᵃxᵇ → xᵃ⁺ᵇ; (x y)ⁿ → xⁿyⁿ (up to 16 factors) |
 //! | numbers | whose product or power leaves the normal numbers of `f64` stay beside their factors: (1e-200 x)² is not 0·x² |
-//! | quotients | x/y → x·y⁻¹; x/x → 1; xᵉ/xⁿ → xᵉ⁻ⁿ for a number e |
+//! | quotients | x/y → x·y⁻¹; x/x → 1; xᵉ/xⁿ → xᵉ⁻ⁿ for a number e; xᵉ⁻¹·x → xᵉ |
 //! | powers | x^n a product for whole n; x^(n/2) → √xⁿ |
 //! | √ | √x^(2n) → xⁿ; √(x²) → abs x |
-//! | abs, sign | abs(x)^(2n) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x |
+//! | abs, sign | abs(x)^(2n) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
 //! | parity | sin(−x) → −sin x, cos(−x) → cos x, and so for each even or odd function |
 //! | min, max | of x and x → x; hypot(x, 0) → abs x |
 //! | select | with equal branches → the branch; with a decided condition → its branch |
