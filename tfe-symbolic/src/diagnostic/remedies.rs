@@ -1,6 +1,7 @@
 //! The remedy for each kind of mistake.
 
 use crate::diagnostic::kind::Kind;
+use crate::expr::function::Function;
 use crate::vocabulary::{self, Argument};
 
 impl Kind {
@@ -26,7 +27,11 @@ impl Kind {
             Self::FieldAccess { object, field } => format!(
                 "formulas use the fields of the struct under the attribute: declare `{object}_{field}: f64`"
             ),
-            Self::MethodCall { object, method } => format!("write `{method}({object})`"),
+            Self::MethodCall { object, method } => match arity(method) {
+                None => format!("write `{object}^n` for a power"),
+                Some(2) => format!("write `{method}({object}, …)`"),
+                Some(_) => format!("write `{method}({object})`"),
+            },
             Self::Bars => {
                 "write `abs(x)` for an absolute value, and the formula itself instead of a closure".into()
             }
@@ -349,6 +354,14 @@ impl Kind {
             | Self::EmptyRange { .. } => return None,
         })
     }
+}
+
+/// How many arguments a function has; nothing of methods that are no functions here.
+fn arity(name: &str) -> Option<usize> {
+    let mut special = vocabulary::SPECIAL_FUNCTIONS.iter();
+    let special = special.find(|(special, _)| *special == name);
+    let elementary = Function::parse(name).map(Function::arity);
+    elementary.or(special.map(|(_, arity)| *arity))
 }
 
 /// A pass as it may be written.

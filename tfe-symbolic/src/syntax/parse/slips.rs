@@ -5,6 +5,9 @@ use std::ops::Range as Bytes;
 use crate::diagnostic::Kind;
 use crate::vocabulary::is_function;
 
+/// The methods of Rust's numbers for what is an operator here.
+const POWERS: [&str; 2] = ["powi", "powf"];
+
 /// The habit behind a syntax error at a place of the text of an argument, and what to underline.
 pub(super) fn slip(argument: &str, text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
     let at = at + (text[at..].len() - text[at..].trim_start().len());
@@ -65,7 +68,8 @@ fn point(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
     let end = start + field.end;
     let (name, field) = (text[object.clone()].to_owned(), text[start..end].to_owned());
     let called = text[end..].trim_start().starts_with('(');
-    let kind = if called && is_function(&field) {
+    let is_method = is_function(&field) || POWERS.contains(&&*field);
+    let kind = if called && is_method {
         Kind::MethodCall {
             object: name,
             method: field,
@@ -131,6 +135,7 @@ mod tests {
         check("constraint(rod) = x^2 §= l^2", "=", "EqualsSign");
         check("output(a) = link §. m", "link . m", "FieldAccess");
         check("output(a) = x§.sin()", "x.sin", "MethodCall");
+        check("output(a) = x§.powi(2)", "x.powi", "MethodCall");
         check("output(a) = §|x| x^2", "|", "Bars");
     }
 
