@@ -212,6 +212,24 @@ fn drag_of_relative_velocities() {
     let found = results_of(text, &parameters, ALL, &[0.0; 2], &[5.0, 4.0]);
     close(found.force_z[0][0], -0.3 * 6.8, "against a stream");
     close(found.force_z[0][1], -0.3 * 2.4, "against a stream");
+    // With parameters under the root, or in the power.
+    for (factor, size, exponent) in [
+        ("sqrt(w*(dot(x)^2 + dot(y)^2))", 10.0, 1.0),
+        ("(w*(dot(x)^2 + dot(y)^2))^0.35", 100_f64.powf(0.35), 0.7),
+    ] {
+        let text = format!(
+            "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2, force(x) = -c*{factor}*dot(x)"
+        );
+        let of = |v: [f64; 2]| results_of(&text, &[("c", 0.3), ("w", 4.0)], ALL, &[0.0; 2], &v);
+        assert_eq!(of([0.0; 2]).force_z.concat(), [0.0; 4], "{factor}");
+        let found = of([3.0, 4.0]);
+        close(
+            found.force_z[0][0],
+            -0.3 * size * (1.0 + exponent * 0.36),
+            factor,
+        );
+        close(found.force_z[0][1], -0.3 * size * exponent * 0.48, factor);
+    }
     let text = "coordinates(r, a), let s = norm([dot(r), r*dot(a)]), \
         lagrangian = (dot(r)^2 + r^2*dot(a)^2)/2, \
         force(r) = -c*s*dot(r), force(a) = -c*s*r^2*dot(a)";

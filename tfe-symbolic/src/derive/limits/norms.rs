@@ -26,6 +26,8 @@ struct Norm {
     root: Option<ExprId>,
     /// The argument of the root without a number in front.
     square: Option<ExprId>,
+    /// The same without parameters in front, if there are some.
+    bare: Option<ExprId>,
     /// Whether there is no such number.
     is_plain: bool,
     /// The xᵢ as products, without the parameters in them.
@@ -96,6 +98,24 @@ fn part(graph: &Graph, x: ExprId, root: i32) -> Option<Vec<(ExprId, i32)>> {
     (!part.is_empty()).then_some(part)
 }
 
+/// The sum in a product of parameters with one.
+fn without_parameters(graph: &Graph, square: ExprId) -> Option<ExprId> {
+    let Node::Product(factors) = graph.node(square) else {
+        return None;
+    };
+    let is_parameter = |x: ExprId| {
+        matches!(
+            graph.node(x),
+            Node::Input(Input::Parameter(_) | Input::ParameterElement(..))
+        )
+    };
+    let mut others = factors.iter().filter(|(x, _)| !is_parameter(*x));
+    match (others.next(), others.next()) {
+        (Some((sum, 1)), None) if matches!(graph.node(*sum), Node::Sum { .. }) => Some(*sum),
+        _ => None,
+    }
+}
+
 /// One where something that is never negative is zero, and itself elsewhere.
 fn one_where_zero(graph: &mut Graph, x: ExprId) -> ExprId {
     let one = graph.constant(Constant::ONE);
@@ -155,6 +175,7 @@ impl Norm {
                     return Some(Self {
                         root: Some(x),
                         square: None,
+                        bare: None,
                         is_plain: true,
                         parts: parts.collect::<Option<_>>()?,
                     });
@@ -167,7 +188,8 @@ impl Norm {
     }
 
     fn of_square(graph: &Graph, square: ExprId) -> Option<Self> {
-        let (constant, terms) = graph.terms(square);
+        let bare = without_parameters(graph, square);
+        let (constant, terms) = graph.terms(bare.unwrap_or(square));
         let is_sum_of_squares =
             constant.is_zero() && terms.iter().all(|(c, _)| !c.is_negative() && !c.is_zero());
         if !is_sum_of_squares {
@@ -181,6 +203,7 @@ impl Norm {
         Some(Self {
             root: graph.find(&root),
             square: Some(square),
+            bare,
             is_plain: true,
             parts: parts.collect::<Option<_>>()?,
         })
@@ -197,7 +220,7 @@ impl Norm {
         if Some(x) == self.root {
             return Some(1.0);
         }
-        if Some(x) == self.square {
+        if Some(x) == self.square || Some(x) == self.bare {
             return Some(2.0);
         }
         match graph.node(x) {
@@ -379,7 +402,7 @@ impl Norm {
     /// The norm, or a root or power of it, with one in place of the norm where that vanishes.
     fn or_one(&self, graph: &mut Graph, x: ExprId) -> ExprId {
         let (coefficient, inner) = graph.as_multiple(x);
-        let is_own = |x: ExprId| Some(x) == self.root || Some(x) == self.square;
+        let is_own = |x: ExprId| [self.root, self.square, self.bare].contains(&Some(x));
         let new = match (graph.node(inner).clone(), self.root) {
             // With one choice for the norm and its square.
             (_, Some(root)) if Some(inner) == self.square && self.is_plain => {
