@@ -369,10 +369,14 @@ impl Norm {
             return None;
         }
         let is_single = shift == 0 && above == 1;
+        if is_single && self.root.is_some() {
+            // Beside a root of the norm, as of an attraction, zero is a singular point as a rule.
+            return None;
+        }
         let root = self.root.filter(|_| self.is_plain && inner == base);
         let (divisor, times, left) = match (is_root, root) {
             (true, _) => (base, above, 0),
-            (false, Some(root)) if above % 2 == 1 && !is_single => (root, above, 0),
+            (false, Some(root)) if above % 2 == 1 => (root, above, 0),
             (false, _) => (base, above / 2, above % 2),
         };
         let units = if is_root { 1 } else { 2 };
