@@ -452,6 +452,25 @@ fn powers_of_absolute_values_at_zero() {
     }
 }
 
+/// Polynomials as sums over exponents: 0 x⁻¹ is zero at zero.
+#[test]
+fn whole_exponents_at_zero() {
+    let energy = "sum(i in 0..20, k*x^i)";
+    for x in [0.0, 0.5, 1.5] {
+        let (mut first, mut second) = (0.0, 0.0);
+        for i in 1..20 {
+            let n = f64::from(i);
+            first += 0.7 * n * f64::powi(x, i - 1);
+            if i > 1 {
+                second += 0.7 * n * (n - 1.0) * f64::powi(x, i - 2);
+            }
+        }
+        check_slopes(energy, &[("k", 0.7)], x, (first, second));
+    }
+    let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+    assert!(derivation_of(&text, &[("k", 0.7)]).structure().smooth);
+}
+
 /// Numbers whose powers and products leave the range of `f64` stay beside what they multiply.
 #[test]
 fn numbers_out_of_range_are_not_folded() {

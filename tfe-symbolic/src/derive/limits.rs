@@ -3,10 +3,12 @@
 //! ```text
 //! m = max(x, 0)        ∂²(m √m)/∂x² = 3/(4 √m) { 1  where x ≥ 0;  0  elsewhere }  →  { 3/(4 √m)  where x ≥ 0;  0  elsewhere }
 //! h = √(x² + y²)       ∂²h³/∂x∂y = 3 x y/h                                        →  3 x y/{ 1  where h ≤ 0;  h  elsewhere }
+//! xⁿ                   ∂xⁿ/∂x = n xⁿ⁻¹                                            →  { 0  where n = 0;  n xⁿ⁻¹  elsewhere }
 //! ```
 //!
-//! Of a product with a choice between something and zero, what may be infinite goes inside of the choice. Norms are told in `norms.rs`. Both are done
-//! to the entries at last: before, factors have met, so that m/√m is √m and nothing has to be chosen.
+//! Of a product with a choice between something and zero, what may be infinite goes inside of the choice. Norms are told in `norms.rs`. A whole exponent
+//! is an index, as in `sum(i in 0..N, a[i]*x^i)`, or a length. All is done to the entries at last: before, factors have met, so that m/√m is √m and
+//! nothing has to be chosen.
 
 mod norms;
 
@@ -15,6 +17,7 @@ use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::input::Input;
 use crate::expr::rewrite::Mapping;
 use crate::program::Array;
 use norms::Norms;
@@ -47,6 +50,7 @@ pub(crate) fn take_limits<'a>(
         if is_product {
             new = norms.limit(graph, new);
             new = inside_choices(graph, new);
+            new = where_exponents_vanish(graph, new);
         }
         mapping.set(old, new);
     }
@@ -168,6 +172,62 @@ fn inside_choices(graph: &mut Graph, x: ExprId) -> ExprId {
         }
     }
     x
+}
+
+/// A product with zero in place of n (n − 1) … xⁿ⁻ᵏ where its whole numbers vanish: with a negative exponent the power is infinite at zero.
+fn where_exponents_vanish(graph: &mut Graph, x: ExprId) -> ExprId {
+    let (coefficient, product) = graph.as_multiple(x);
+    let Node::Product(factors) = graph.node(product) else {
+        return x;
+    };
+    let mut kinds = factors.iter().map(|(y, _)| graph.node(*y));
+    if !kinds.any(|node| matches!(node, Node::Power { .. })) {
+        return x;
+    }
+    let is_power = |(y, n): &(ExprId, i32)| match graph.node(*y) {
+        Node::Power { base, exponent } => {
+            *n > 0 && is_whole(graph, *exponent) && !graph.inputs_of(*base).iter().all(is_at_rest)
+        }
+        _ => false,
+    };
+    let is_number = |(y, n): &(ExprId, i32)| {
+        let is_atom = !matches!(graph.node(*y), Node::Power { .. });
+        *n > 0 && is_atom && is_whole(graph, *y)
+    };
+    let (mut numbers, mut powers, mut others) = (Vec::new(), Vec::new(), Vec::new());
+    for factor in factors {
+        if is_number(factor) {
+            numbers.push(*factor);
+        } else if is_power(factor) {
+            powers.push(*factor);
+        } else {
+            others.push(*factor);
+        }
+    }
+    if numbers.is_empty() || powers.is_empty() {
+        return x;
+    }
+    let number = graph.product(Constant::ONE, &numbers);
+    let square = graph.multiply(number, number);
+    powers.extend(numbers);
+    let value = graph.product(Constant::ONE, &powers);
+    let zero = graph.constant(Constant::ZERO);
+    let chosen = graph.select(Comparison::LessOrEqual, square, zero, zero, value);
+    others.push((chosen, 1));
+    graph.product(coefficient, &others)
+}
+
+/// Whether it is made of indices and lengths.
+fn is_whole(graph: &Graph, x: ExprId) -> bool {
+    let inputs = graph.inputs_of(x);
+    !inputs.is_empty() && (inputs.iter()).all(|input| matches!(input, Input::Integer(_)))
+}
+
+fn is_at_rest(input: &Input) -> bool {
+    matches!(
+        input,
+        Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_)
+    )
 }
 
 /// Whether xⁿ may be infinite where something in it vanishes.
