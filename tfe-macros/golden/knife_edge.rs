@@ -1,6 +1,6 @@
 /// # Derived model
 /// ```text
-/// L = ½ m (ẋ² + ẏ²) + ½ j φ̇² + m g sin α x
+/// L = ½ m (ẋ² + ẏ²) + ½ j φ̇² + m g sin(α) x
 /// 0 = ẋ sin φ − ẏ cos φ      (blade)
 /// coordinates: x, y, φ      parameters: m, j, g, α
 /// operations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other
@@ -311,7 +311,7 @@ impl KnifeEdge {
                 functions: 0,
             },
             page: ::core::concat!(
-                "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin α x\n",
+                "L = ½ m (x\u{307}² + y\u{307}²) + ½ j φ\u{307}² + m g sin(α) x\n",
                 "0 = x\u{307} sin φ − y\u{307} cos φ      (blade)\n",
                 "coordinates: x, y, φ      parameters: m, j, g, α\n",
                 "operations, value: 3 +−, 9 ×, 0 ÷, 1 sin/cos, 0 other\n",
