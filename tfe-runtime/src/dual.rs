@@ -37,6 +37,18 @@ pub trait Differentiable: Real {
     fn slope_of_choice(mask: Self::Mask, then: Self, otherwise: Self) -> Self {
         Self::select(mask, then, otherwise)
     }
+
+    /// f′ x′, of a slope x′; zero where the slope is: an infinite derivative (√0) is no derivative along such a direction.
+    #[must_use]
+    fn times_derivative(self, derivative: Self) -> Self {
+        unless_zero(self, derivative * self)
+    }
+
+    /// x′/r, of a slope x′ that vanishes where r does; zero where the slope is.
+    #[must_use]
+    fn over_length(self, length: Self) -> Self {
+        unless_zero(self, self / length)
+    }
 }
 
 impl Differentiable for f64 {}
@@ -59,6 +71,24 @@ impl<S: Differentiable> Differentiable for Dual<S> {
             S::slope_of_choice(mask, then.value, otherwise.value),
             S::slope_of_choice(mask, then.slope, otherwise.slope),
         )
+    }
+
+    /// The slope of f′ x′ is that of f′ times x′, and f′ times that of x′: the latter also where x′ is zero, as that of x y at x = 0.
+    fn times_derivative(self, derivative: Self) -> Self {
+        let of_derivative = self.value.times_derivative(derivative.slope);
+        let of_slope = self.slope.times_derivative(derivative.value);
+        // An infinite derivative is none here, either.
+        let is_finite = (derivative.value.abs()).less_or_equal(number(f64::MAX));
+        Self::new(
+            self.value.times_derivative(derivative.value),
+            of_derivative + S::select(is_finite, of_slope, number(0.0)),
+        )
+    }
+
+    fn over_length(self, length: Self) -> Self {
+        let value = self.value.over_length(length.value);
+        let slope = (self.slope - value * length.slope) / length.value;
+        Self::new(value, unless_zero(length.value, slope))
     }
 }
 
@@ -88,14 +118,14 @@ impl<S: Copy> Dual<S> {
 impl<S: Differentiable> Dual<S> {
     /// f(x) and f′(x) x′.
     fn chain(self, value: S, derivative: S) -> Self {
-        Self::new(value, unless_zero(self.slope, derivative * self.slope))
+        Self::new(value, self.slope.times_derivative(derivative))
     }
 }
 
-/// A product with a slope; zero where the slope is: an infinite derivative (√0) is no derivative along such a direction.
-fn unless_zero<S: Real>(slope: S, product: S) -> S {
+/// A number; zero where another is.
+fn unless_zero<S: Real>(other: S, otherwise: S) -> S {
     let zero = S::from_f64(0.0);
-    S::select(slope.abs().less_or_equal(zero), zero, product)
+    S::select(other.abs().less_or_equal(zero), zero, otherwise)
 }
 
 /// A number without slope.
@@ -294,7 +324,7 @@ impl<S: Differentiable> Real for Dual<S> {
     fn hypot(self, other: Self) -> Self {
         let root = Real::hypot(self.value, other.value);
         let slope = self.value * self.slope + other.value * other.slope;
-        Self::new(root, unless_zero(slope, slope / root))
+        Self::new(root, slope.over_length(root))
     }
     fn powi(self, exponent: i32) -> Self {
         let derivative = if exponent == 0 {
@@ -308,9 +338,9 @@ impl<S: Differentiable> Real for Dual<S> {
         let value = Real::powf(self.value, exponent.value);
         let by_base = exponent.value * Real::powf(self.value, exponent.value - number(1.0));
         let mut result = self.chain(value, by_base);
-        let by_exponent = value * Real::ln(self.value) * exponent.slope;
         // Where the power vanishes the logarithm is infinite, and the slope zero.
-        result.slope += unless_zero(value * exponent.slope, by_exponent);
+        let by_exponent = unless_zero(value, value * Real::ln(self.value));
+        result.slope += exponent.slope.times_derivative(by_exponent);
         result
     }
     fn less(self, other: Self) -> S::Mask {
@@ -367,6 +397,50 @@ mod tests {
                 (exact - difference).abs() < 1e-7 * exact.abs().max(1.0),
                 "{name}"
             );
+        }
+    }
+
+    type Twice = Dual<Dual>;
+
+    /// ∂²f/∂x∂y at x = 0, y = 1/2: where x y stands inside another function its slope along y is zero, and the slope of that is not.
+    #[test]
+    fn second_derivatives_see_the_bend_of_what_has_no_slope() {
+        let one = |value: f64| Twice::from_f64(value);
+        let x = Dual::new(Dual::new(0.0, 1.0), Dual::ZERO);
+        let y = Dual::new(Dual::new(0.5, 0.0), Dual::new(1.0, 0.0));
+        let product = x * y;
+        for (name, value, exact) in [
+            ("sin", Real::sin(product), 1.0),
+            ("exp", Real::exp(product), 1.0),
+            ("atan", Real::atan(product), 1.0),
+            ("sqrt", Real::sqrt(one(1.0) + product), 0.5),
+            ("powf", Real::powf(one(1.0) + product, one(1.5)), 1.5),
+            (
+                "power",
+                Real::powf(one(2.0), product),
+                core::f64::consts::LN_2,
+            ),
+            (
+                "hypot",
+                Real::hypot(one(1.0) + product, one(1.0)),
+                core::f64::consts::FRAC_1_SQRT_2,
+            ),
+        ] {
+            let found = value.slope.slope;
+            assert!(
+                (found - exact).abs() < 4.0 * f64::EPSILON,
+                "{name}: {found}"
+            );
+        }
+    }
+
+    /// An infinite derivative is none along what has no slope, to second order as well: |v| v at rest.
+    #[test]
+    fn roots_at_zero_have_no_second_derivatives() {
+        let v = Dual::new(Dual::new(0.0, 1.0), Dual::new(1.0, 0.0));
+        let still = Twice::from_f64(0.0);
+        for drag in [Real::sqrt(v * v) * v, Real::hypot(v, still) * v] {
+            assert_eq!((drag.slope.value, drag.slope.slope), (0.0, 0.0));
         }
     }
 }
