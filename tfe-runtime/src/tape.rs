@@ -8,6 +8,7 @@
 //!
 //! Only operations that a parameter has a part in are written down; coordinates, velocities and the time are mere numbers. Some points go side by side, as the operations are the same at all of them.
 
+use crate::dual::below_one;
 use crate::model::{First, Model};
 use crate::real::Real;
 use alloc::vec::Vec;
@@ -476,10 +477,10 @@ impl Real for Taped<'_> {
         self.one(Real::tan, |_, tan| 1.0 + tan * tan)
     }
     fn asin(self) -> Self {
-        self.one(Real::asin, |x, _| 1.0 / Real::sqrt(1.0 - x * x))
+        self.one(Real::asin, |x, _| 1.0 / Real::sqrt(below_one(x)))
     }
     fn acos(self) -> Self {
-        self.one(Real::acos, |x, _| -1.0 / Real::sqrt(1.0 - x * x))
+        self.one(Real::acos, |x, _| -1.0 / Real::sqrt(below_one(x)))
     }
     fn atan(self) -> Self {
         self.one(Real::atan, |x, _| 1.0 / (1.0 + x * x))
@@ -502,10 +503,11 @@ impl Real for Taped<'_> {
         self.one(Real::asinh, |x, _| 1.0 / Real::sqrt(x * x + 1.0))
     }
     fn acosh(self) -> Self {
-        self.one(Real::acosh, |x, _| 1.0 / Real::sqrt(x * x - 1.0))
+        let slope = |x: f64, _: f64| 1.0 / Real::sqrt((x - 1.0) * (x + 1.0));
+        self.one(Real::acosh, slope)
     }
     fn atanh(self) -> Self {
-        self.one(Real::atanh, |x, _| 1.0 / (1.0 - x * x))
+        self.one(Real::atanh, |x, _| 1.0 / below_one(x))
     }
     fn exp(self) -> Self {
         self.one(Real::exp, |_, exp| exp)
@@ -656,6 +658,52 @@ mod tests {
                     );
                 }
             }
+        }
+    }
+
+    /// The derivative of a function by its one parameter.
+    fn by_parameter(value: f64, function: impl for<'t> Fn(Taped<'t>) -> Taped<'t>) -> Row {
+        let tape = RefCell::new(Operations {
+            parameters: 1,
+            ..Operations::default()
+        });
+        let time = Taped {
+            tape: Some(&tape),
+            ..Taped::from_f64(0.0)
+        };
+        let result = function(time.parameter(0, value));
+        let operations = tape.borrow();
+        let mut adjoints = vec![ZERO; 1 + operations.list.len()];
+        adjoints[result.place as usize] = [1.0; LANES];
+        read_backwards(&operations, &mut adjoints);
+        adjoints[0]
+    }
+
+    /// As of dual numbers, to the last digit but a few.
+    #[test]
+    fn slopes_beside_one_have_all_digits() {
+        let (below, above) = (1.0 - 1e-10, 1.0 + 1e-10);
+        let slope = |x: f64, function: fn(Dual) -> Dual| function(Dual::new(x, 1.0)).slope;
+        for (found, expected) in [
+            (
+                by_parameter(below, |x| -x.asin()),
+                -slope(below, Real::asin),
+            ),
+            (
+                by_parameter(below, |x| -x.acos()),
+                -slope(below, Real::acos),
+            ),
+            (
+                by_parameter(below, |x| -x.atanh()),
+                -slope(below, Real::atanh),
+            ),
+            (
+                by_parameter(above, |x| -x.acosh()),
+                -slope(above, Real::acosh),
+            ),
+        ] {
+            let off = (found[0] - expected).abs() / expected.abs();
+            assert!(off < 4.0 * f64::EPSILON, "{off:e}");
         }
     }
 
