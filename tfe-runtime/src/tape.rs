@@ -236,12 +236,13 @@ fn read_backwards(operations: &Operations, adjoints: &mut [Row]) {
     }
 }
 
-/// sum += adjoint · derivative, where an infinite derivative along which nothing changes is none.
+/// sum += adjoint · derivative, where an infinite derivative along which nothing changes is none: nothing that is wanted, or nothing that a parameter moves.
 #[inline]
 fn add(sum: &mut Row, adjoint: &Row, derivative: &Row) {
     for lane in 0..LANES {
         let product = adjoint[lane] * derivative[lane];
-        sum[lane] += if adjoint[lane] == 0.0 { 0.0 } else { product };
+        let is_none = (adjoint[lane] == 0.0) | (derivative[lane] == 0.0);
+        sum[lane] += if is_none { 0.0 } else { product };
     }
 }
 
@@ -531,11 +532,13 @@ impl Real for Taped<'_> {
         Self::select(self.less(other), other, self)
     }
     fn hypot(self, other: Self) -> Self {
+        // A length of zero moves along no direction, as that of dual numbers.
+        let part = |x: f64, root: f64| if root == 0.0 { 0.0 } else { x / root };
         self.two(
             other,
             Real::hypot,
-            |x, _, root| x / root,
-            |_, y, root| y / root,
+            |x, _, root| part(x, root),
+            |_, y, root| part(y, root),
         )
     }
     fn powi(self, exponent: i32) -> Self {
@@ -547,9 +550,15 @@ impl Real for Taped<'_> {
     }
     fn powf(self, exponent: Self) -> Self {
         let by_base = |x: f64, y: f64, _: f64| y * Real::powf(x, y - 1.0);
-        self.two(exponent, Real::powf, by_base, |x, _, power| {
-            power * Real::ln(x)
-        })
+        // Where the power vanishes the logarithm is infinite, and the slope zero.
+        let by_exponent = |x: f64, _: f64, power: f64| {
+            if power == 0.0 {
+                0.0
+            } else {
+                power * Real::ln(x)
+            }
+        };
+        self.two(exponent, Real::powf, by_base, by_exponent)
     }
     fn less(self, other: Self) -> Self::Mask {
         from_fn(|lane| self.value[lane] < other.value[lane])
@@ -677,6 +686,31 @@ mod tests {
         adjoints[result.place as usize] = [1.0; LANES];
         read_backwards(&operations, &mut adjoints);
         adjoints[0]
+    }
+
+    /// As of dual numbers: powers that vanish, whose exponent is a parameter, and roots and lengths of zero that no parameter moves.
+    #[test]
+    fn what_vanishes_has_no_part() {
+        let x = [0.0, 1.0, 4.0, 16.0];
+        let by_exponent = by_parameter(1.5, |a| Taped::of(x).powf(a));
+        let of_root = by_parameter(0.25, |a| (a * Taped::of(x)).sqrt());
+        let of_length = by_parameter(0.25, |a| (a * Taped::of(x)).hypot(a * Taped::of(x)));
+        assert_eq!(by_parameter(0.0, |a| a.hypot(Taped::of(ZERO))), ZERO);
+        for lane in 0..LANES {
+            // xᵃ ln x, ½ √(x/a) and √2 x
+            let x: f64 = x[lane];
+            let logarithm = if x == 0.0 { 0.0 } else { x.ln() };
+            let expected = [
+                x * x.sqrt() * logarithm,
+                x.sqrt(),
+                core::f64::consts::SQRT_2 * x,
+            ];
+            let found = [by_exponent[lane], of_root[lane], of_length[lane]];
+            for (found, expected) in found.into_iter().zip(expected) {
+                let off = (found - expected).abs();
+                assert!(off <= 4.0 * f64::EPSILON * expected, "{found} {expected}");
+            }
+        }
     }
 
     /// As of dual numbers, to the last digit but a few.
