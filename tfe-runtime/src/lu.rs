@@ -30,6 +30,8 @@ pub fn factor(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(
     if size >= WIDE
         && let Some(isa) = pulp::x86::V3::try_new()
     {
+        // What lies behind the matrix is no row of it.
+        let matrix = &mut matrix[..size * size];
         return wide::factor(isa, size, matrix, pivots).map_err(|column| Singular { column });
     }
     factor_plainly(size, matrix, pivots)
@@ -99,6 +101,7 @@ pub fn solve(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64])
 
 #[inline(never)]
 fn solve_large(size: usize, factors: &[f64], vector: &mut [f64]) {
+    let vector = &mut vector[..size];
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     if let Some(isa) = pulp::x86::V3::try_new() {
         return wide::solve(isa, size, factors, vector);
@@ -366,6 +369,30 @@ mod wide_tests {
                     assert!((found - wanted).abs() < 1e-12, "{size}: {found} {wanted}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn what_lies_behind_a_matrix_or_a_vector_stays() {
+        for size in [3, WIDE, 30] {
+            let mut matrix = numbers(size * size, 17);
+            for row in 0..size {
+                matrix[row * size + row] += 3.0;
+            }
+            let mut alone = matrix.clone();
+            matrix.resize(size * size + size, 7.0);
+            let (mut pivots, mut others) = (vec![0; size], vec![0; size]);
+            factor(size, &mut matrix, &mut pivots).expect("regular");
+            factor(size, &mut alone, &mut others).expect("regular");
+            assert_eq!((&matrix[..size * size], &pivots), (&alone[..], &others));
+            assert_eq!(matrix[size * size..], vec![7.0; size], "{size}");
+            let mut side = numbers(size, 23);
+            let mut longer = side.clone();
+            longer.resize(size + 5, 7.0);
+            solve(size, &matrix, &pivots, &mut longer);
+            solve(size, &alone, &pivots, &mut side);
+            assert_eq!(longer[..size], side, "{size}");
+            assert_eq!(longer[size..], [7.0; 5], "{size}");
         }
     }
 
