@@ -159,12 +159,26 @@ pub(crate) fn factor_block<const N: usize>(
     }
     factor(N, matrix, pivots)?;
     for (column, scale) in scales.iter().enumerate() {
+        const ROUNDING: f64 = 8.0 * f64::EPSILON;
         let pivot = matrix[column * N + column].abs();
-        if pivot.is_nan() || pivot <= 8.0 * f64::EPSILON * scale {
+        if pivot.is_nan() || (pivot <= ROUNDING * scale && is_lost(N, matrix, column, ROUNDING)) {
             return Err(Singular { column });
         }
     }
     Ok(())
+}
+
+/// Whether a pivot is no more than so small a part of what was subtracted on the way to it, Σ |L_ck U_kc|: rows carry units, too, as those of a mass matrix do, and a pivot that is small beside
+/// its column may have all digits. The units of rows and columns multiply both alike.
+#[cold]
+#[inline(never)]
+pub(crate) fn is_lost(size: usize, factors: &[f64], column: usize, part: f64) -> bool {
+    let mut subtracted = 0.0;
+    for k in 0..column {
+        subtracted += (factors[column * size + k] * factors[k * size + column]).abs();
+    }
+    // NaN is lost.
+    !(factors[column * size + column].abs() > part * subtracted)
 }
 
 /// The factors of a mass matrix, or of another N × N block.
@@ -244,6 +258,36 @@ mod tests {
         assert!(Block::of(&matrix).is_err());
         // Badly scaled, but regular.
         assert!(Block::of(&[[1e12, 1e-6], [1e12, 2e-6]]).is_ok());
+    }
+
+    /// A body of one with a pendulum of a half, so short that its angle moves next to nothing: the matrix is as regular as of a long one.
+    #[test]
+    fn coordinates_may_have_any_units() {
+        let length = 1e-17;
+        let (both, turned, square) = (1.5, 0.5 * length, 0.5 * length * length);
+        for (matrix, side) in [
+            // M times (1, 1/length)
+            (
+                [[both, turned], [turned, square]],
+                [both + turned / length, turned + square / length],
+            ),
+            (
+                [[square, turned], [turned, both]],
+                [square / length + turned, turned / length + both],
+            ),
+        ] {
+            let mut solution = side;
+            let block = Block::of(&matrix).expect("regular");
+            block.solve(&mut solution);
+            solution.sort_unstable_by(f64::total_cmp);
+            let [distance, angle] = solution;
+            // The pivot is two thirds of what it is the rest of: some roundings.
+            assert!((distance - 1.0).abs() < 16.0 * f64::EPSILON, "{distance}");
+            assert!(
+                (angle * length - 1.0).abs() < 16.0 * f64::EPSILON,
+                "{angle}"
+            );
+        }
     }
 }
 

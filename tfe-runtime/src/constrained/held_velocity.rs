@@ -19,7 +19,7 @@ use alloc::vec::Vec;
 /// [ A     0  ] [ δη ] = [ − ∂(A v + a)        ] ,     L_v(q, v, t) + Aᵀη = p                           (T-161)
 /// ```
 ///
-/// with what time, coordinates and parameters change at a fixed velocity under ∂. A mass matrix counts as singular where a pivot of it is below 1e-10 of its column, as [`velocity_of`](super::velocity_of) takes it;
+/// with what time, coordinates and parameters change at a fixed velocity under ∂. A mass matrix counts as singular where a pivot of it is below 1e-10 of its column, and of what was subtracted on the way to it, as [`velocity_of`](super::velocity_of) takes it;
 /// redundant rows are left out. Derivatives of velocities and outputs use it (`Simulation::run_sensitive` of the crate `tfe`).
 #[derive(Clone, Debug)]
 pub struct HeldVelocity<const N: usize> {

@@ -108,20 +108,24 @@ pub(super) fn border<const N: usize>(
     }
 }
 
-/// A mass matrix with a relative pivot below this one leaves the velocity of a momentum to the constraints.
+/// A mass matrix with a pivot below this part of its column, and of what was subtracted on the way to it, leaves the velocity of a momentum to the constraints.
 const SINGULAR: f64 = 1e-10;
 
 /// Whether a mass matrix alone says the velocity of a momentum.
 pub(crate) fn is_regular<const N: usize>(mut zz: [[f64; N]; N]) -> bool {
-    // Columns carry the units of their coordinate: a pivot is small only beside its column.
+    // Columns carry the units of their coordinate, as rows do: a pivot is small only beside its column, and beside what it is the rest of.
     let mut scales = [0.0_f64; N];
     for row in &zz {
         for (scale, entry) in scales.iter_mut().zip(row) {
             *scale = scale.max(entry.abs());
         }
     }
-    lu::factor(N, zz.as_flattened_mut(), &mut [0; N]).is_ok()
-        && (0..N).all(|a| zz[a][a].abs() > SINGULAR * scales[a])
+    if lu::factor(N, zz.as_flattened_mut(), &mut [0; N]).is_err() {
+        return false;
+    }
+    (0..N).all(|a| {
+        zz[a][a].abs() > SINGULAR * scales[a] || !lu::is_lost(N, zz.as_flattened(), a, SINGULAR)
+    })
 }
 
 /// The velocity that a momentum has without regard to the constraints, `v` being the one with it: the same if the state is consistent.
@@ -148,4 +152,27 @@ where
         }
     }
     free_velocity(model, t, q, p, v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn matrices_are_regular_in_any_units() {
+        for length in [1.0, 1e-6, 1e-11, 1e-14, 1e-20, 1e11] {
+            // A body of one with a pendulum of a half.
+            let (turned, square) = (0.5 * length, 0.5 * length * length);
+            assert!(is_regular([[1.5, turned], [turned, square]]), "{length}");
+            assert!(is_regular([[square, turned], [turned, 1.5]]), "{length}");
+            // The same without the body: bob and angle move alike.
+            let alone = [[0.5, turned], [turned, square]];
+            assert!(!is_regular(alone), "{length}");
+        }
+        // Of rank one, with entries that are not exact.
+        let direction: [f64; 3] = [0.3, 0.7, -1.1];
+        assert!(!is_regular(
+            direction.map(|a| direction.map(|b| a * b / 3.0))
+        ));
+    }
 }
