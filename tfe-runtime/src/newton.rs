@@ -183,7 +183,8 @@ impl Monitor {
     /// What a fixed point that has come to no end ends with.
     #[cold]
     pub(crate) fn stalled(&self, iterations: u32, control: &Control) -> StepError {
-        if !self.last.is_finite() {
+        // Without an iteration there is no increment.
+        if iterations > 0 && !self.last.is_finite() {
             return StepError::NonFinite;
         }
         StepError::FixedPointStalled {

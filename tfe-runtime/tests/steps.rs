@@ -513,6 +513,19 @@ fn failures_are_typed_and_leave_the_state() {
         "{error}"
     );
 
+    let control = Control {
+        max_iterations: 0,
+        solve: Solve::FixedPoint,
+        ..Control::default()
+    };
+    let mut stepper = Stepper::new(&model, Element::mixed(4), control).expect("valid");
+    let error = stepper.advance(0.0, 0.1, &mut state, &[]);
+    let error = error.expect_err("none is too few");
+    assert!(
+        matches!(error, StepError::FixedPointStalled { iterations: 0, .. }),
+        "{error}"
+    );
+
     let massless = OscillatorL {
         m: 0.0,
         d: 0.0,

@@ -298,7 +298,9 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
     fn stalled(&self, outcome: &Outcome, newton: bool) -> StepError {
         let (iterations, residual) = (outcome.iterations, outcome.residual);
         let tolerance = self.control.tolerance;
-        match (residual.is_finite() && !outcome.converged, newton) {
+        // Without an iteration there is no increment.
+        let is_known = residual.is_finite() || iterations == 0;
+        match (is_known && !outcome.converged, newton) {
             (false, _) => StepError::NonFinite,
             (true, true) => StepError::NewtonStalled {
                 iterations,
