@@ -4,7 +4,7 @@ use crate::control::{POSITION_ROUND_OFF, Solve};
 use crate::element::Element;
 use crate::equations::Increment;
 use crate::error::StepError;
-use crate::legendre::energy_at;
+use crate::legendre::{energy_at, largest};
 use crate::model::{Model, State};
 
 /// Whether what an iteration has found is near where it began: increments that shrink by a factor from the first one on stay in a ball around the start, and the
@@ -96,7 +96,7 @@ impl Evidence {
         } else {
             Energy::MAX_OF_OTHERS
         };
-        if energy.is_kept(most, element) {
+        if energy.is_kept(most, element) || (energy.is_rest && is_proven.is_ok()) {
             return Ok(());
         }
         is_proven?;
@@ -122,6 +122,8 @@ pub(crate) struct Energy {
     /// How much of it is kinetic at the start, or has become so: half of p·v stands for the kinetic energy.
     turned: f64,
     is_forward: bool,
+    /// Nothing has moved but for roundings, and what has changed of the energy is one.
+    is_rest: bool,
 }
 
 /// Whether energies tell anything of a model: those that conserve them. Constraints are told by their drift.
@@ -165,23 +167,52 @@ impl Energy {
         let (before, kinetic) = energies(model, t, start, first);
         let (after, moving) = energies(model, t + h, end, last);
         let potential = (after - moving) - (before - kinetic);
-        Self {
+        let energy = Self {
             before,
             after,
             turned: kinetic.abs() + potential.abs(),
             is_forward: h > 0.0,
+            is_rest: false,
+        };
+        let is_changed = (after - before).abs() > energy.allowed(Self::MAX_OF_OTHERS);
+        Self {
+            is_rest: is_changed && is_rest(h, [start, end], [first, last]),
+            ..energy
         }
+    }
+
+    /// A change by so much of what was turned, and roundings.
+    fn allowed(&self, most: f64) -> f64 {
+        most * self.turned + 1e-9 * self.before.abs().max(self.after.abs())
     }
 
     /// Whether the energy has changed by no more than so much of what was turned. Elements that damp may lose some.
     fn is_kept(&self, most: f64, element: Element) -> bool {
         let change = self.after - self.before;
-        let rounding = 1e-9 * self.before.abs().max(self.after.abs());
-        let allowed = most * self.turned + rounding;
+        let allowed = self.allowed(most);
         let is_damped = element.family().damps() && self.is_forward;
         // NaN is not kept.
         change <= allowed && (is_damped || -change <= allowed)
     }
+}
+
+/// Whether a step moves coordinates by no more than their roundings: no other root is as near, and energies that are next to nothing are made of roundings.
+#[cold]
+#[inline(never)]
+fn is_rest<const N: usize>(
+    h: f64,
+    [start, end]: [&State<N>; 2],
+    velocities: [&[f64; N]; 2],
+) -> bool {
+    let extent = largest(&start.q).max(largest(&end.q));
+    let mut moved = 0.0_f64;
+    for a in 0..N {
+        moved = moved.max((end.q[a] - start.q[a]).abs());
+        for v in velocities {
+            moved = moved.max((h * v[a]).abs());
+        }
+    }
+    moved <= POSITION_ROUND_OFF * extent
 }
 
 /// The energy, and half of p·v.

@@ -585,3 +585,21 @@ fn a_rest_stays_a_rest() {
     let end = run(&model, Element::mixed(4), start, 0.01, 10);
     assert!((end.q[0] - start.q[0]).abs() < 1e-14);
 }
+
+/// In a well, where the energy is zero but for the rounding of √2: its changes are no jumps.
+#[test]
+fn a_rest_without_energy_stays_one() {
+    let start = State {
+        q: [std::f64::consts::SQRT_2],
+        p: [0.0],
+    };
+    let control = Control {
+        solve: Solve::Newton,
+        ..Control::default()
+    };
+    for element in families(4) {
+        let (end, statistics) = run_with(&Wells {}, element, control, start, 0.1, 10);
+        assert!((end.q[0] - start.q[0]).abs() < 1e-14, "{element}");
+        assert_eq!(statistics.cuts, 0, "{element}");
+    }
+}

@@ -223,6 +223,20 @@ model! {
 }
 
 model! {
+    /// Two wells, L = v²/2 − (q² − 2)²/4
+    Wells[1] {} Lagrangian SIMPLE;
+    value(self, t, q, v) {
+        let depth = q[0] * q[0] - c(2.0);
+        v[0] * v[0] * c(0.5) - depth * depth * c(0.25)
+    }
+    derivatives(first, second) {
+        let square = q[0] * q[0];
+        (first.z[0], first.q[0]) = (v[0], -(square - c(2.0)) * q[0]);
+        (second.zz[0][0], second.qq[0][0]) = (c(1.0), c::<R>(2.0) - square * c(3.0));
+    }
+}
+
+model! {
     /// A stiff spring beside a soft one, L = v·v/2 − k x²/2 − y⁴/4 − x² y²/2
     Stiff[2] { k } Lagrangian SIMPLE;
     value(self, t, q, v) {
