@@ -238,7 +238,7 @@ fn nodes_have_velocities() {
 }
 
 /// A free particle and a linear force that is a sum of impulses in the limit: an impulse in the middle of an element is weighted exactly.
-#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2)]
+#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2, output(kinetic) = m/2*dot(x)^2)]
 struct Free {
     m: f64,
 }
@@ -279,7 +279,20 @@ fn impulses_back_in_time_are_undone() {
     // Symmetric elements go back on themselves.
     check(&Pendulum, Pendulum.state([0.3], [0.7]), [1.5], 1e-12);
     check(&Linear, Linear.state([0.3], [0.7]), [1.5], 1e-12);
-    check(&Rod, Rod.state([0.6, -0.8], [0.8, 0.6]), [0.8, 0.6], 1e-11);
+    let on_rod = Rod.state([0.6, -0.8], [0.8, 0.6]);
+    check(&Rod, on_rod, [0.8, 0.6], 1e-11);
+    // Along the constraint it acts in full, and the first element is that from the state behind it.
+    let run = Simulation::new(&Rod).step(0.05);
+    let kicked = run.clone().impulse(0.0, [0.8, 0.6]);
+    let kicked = kicked.run(on_rod, 0.0..0.1).expect("a run");
+    let behind = Rod.state([0.6, -0.8], [1.6, 1.2]);
+    let behind = run.run(behind, 0.0..0.1).expect("a run");
+    for t in [1e-6, 0.01, 0.03, 0.049] {
+        let (a, b) = (kicked.at(t), behind.at(t));
+        let (a, b) = (a.expect("inside"), b.expect("inside"));
+        assert_close(&a.p, &b.p, 1e-11, "behind an impulse on a rod");
+        assert_close(&a.q, &b.q, 1e-11, "behind an impulse on a rod");
+    }
     let chain = Chain { n: 3 };
     let start = chain.state([0.1, 0.2, 0.4], [0.0; 3]);
     let run = Simulation::new(&chain)
@@ -341,6 +354,38 @@ fn impulses_change_momentum_and_are_weighted_inside_elements() {
                 error.abs() < allowed,
                 "{element}, impulse at {time}: q off by {error:e}"
             );
+        }
+    }
+}
+
+/// Momenta jump at nodes, also where roundings are between the node and the impulse (0.3): inside elements they are those before or behind it, and integrals have the digits of the nodes.
+#[test]
+fn momenta_jump_where_impulses_act_at_nodes() {
+    let model = Free { m: 2.0 };
+    let start = model.state([1.0], [0.5]);
+    for element in [
+        Element::primal(3),
+        Element::primal(4).lobatto(),
+        Element::mixed(2),
+        Element::mixed(4),
+        Element::energy_conserving(3),
+        Element::radau(3),
+    ] {
+        for time in [0.0, 0.3, 0.5, 1.0] {
+            let run = Simulation::new(&model).element(element).step(0.1);
+            let run = run.impulse(time, [0.7]);
+            let motion = run.run(start, 0.0..1.0).expect("a run");
+            for k in 0..100 {
+                let t = 0.005 + 0.01 * f64::from(k);
+                let p = motion.at(t).expect("inside").p[0];
+                let expected = if t < time { 1.0 } else { 1.7 };
+                assert!((p - expected).abs() < 1e-14, "{element}: {p} at {t}");
+            }
+            // p²/(2m)
+            let kinetic = motion.integral(&model, "kinetic").expect("an output");
+            let exact = 0.25 * time + 1.7 * 1.7 / 4.0 * (1.0 - time);
+            let found = kinetic[kinetic.len() - 1];
+            assert!((found - exact).abs() < 1e-14, "{element}: {found}");
         }
     }
 }

@@ -16,14 +16,18 @@ use crate::scheme::{MAX_RATES, SchemeRef};
 /// One element of a motion, to be evaluated anywhere inside.
 ///
 /// Coordinates and momenta are polynomials of degree n − 1 that begin and end at the states of the
-/// nodes, so that the curve is continuous; between nodes their error is of the order hⁿ.
+/// nodes, so that the curve is continuous; between nodes their error is of the order hⁿ. Where impulses act at a node momenta jump there: they begin
+/// behind those at the start, and end before those at the end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DenseElement<const N: usize> {
     times: (f64, f64),
     /// Between the times: the step, whose digits their difference does not have far from zero.
     length: f64,
+    /// Behind the impulses that act there.
     start: State<N>,
     end: State<N>,
+    /// Whether impulses act at the end, before which the polynomials end.
+    jumps: bool,
     /// Legendre coefficients of h dq/dt, then those of h dp/dt.
     rates: Box<[[f64; N]]>,
     /// Of an element that was cut: its pieces; else nothing.
@@ -38,6 +42,7 @@ impl<const N: usize> DenseElement<N> {
             length: end - start,
             start: state,
             end: state,
+            jumps: false,
             rates: Box::new([]),
             pieces: Box::new([]),
         }
@@ -50,6 +55,7 @@ impl<const N: usize> DenseElement<N> {
             length: length(times, last.h),
             start: last.start,
             end: last.end,
+            jumps: false,
             rates: vec![[f64::NAN; N]; 2 * scheme.rates()].into_boxed_slice(),
             pieces: Box::new([]),
         }
@@ -68,6 +74,7 @@ impl<const N: usize> DenseElement<N> {
             length: end - start,
             start: before,
             end: after,
+            jumps: false,
             rates: Box::new([]),
             pieces: pieces.into_boxed_slice(),
         })
@@ -104,11 +111,23 @@ impl<const N: usize> DenseElement<N> {
         let (q, p) = coefficients.split_at_mut(count);
         project(scheme.rate, rates, last.h, q);
         project(scheme.force_rate, forces, last.h, p);
+        let (mut start, mut jumps) = (last.start, false);
         for impulse in interval.impulses {
-            // An impulse is a rate too; its projection has the same integral.
-            let mut values = [0.0; MAX_RATES];
-            legendre(interval.place(impulse), &mut values);
+            let tau = interval.node_or_place(impulse);
             let impulse = impulse.along(interval.length);
+            if tau == 0.0 {
+                for a in 0..N {
+                    start.p[a] += impulse[a];
+                }
+                continue;
+            }
+            if tau == 1.0 {
+                jumps = true;
+                continue;
+            }
+            // One inside is a rate too; its projection has the same integral.
+            let mut values = [0.0; MAX_RATES];
+            legendre(tau, &mut values);
             for (m, row) in p.iter_mut().enumerate() {
                 let weight = (2 * m + 1) as f64 * values[m];
                 for a in 0..N {
@@ -119,8 +138,9 @@ impl<const N: usize> DenseElement<N> {
         Self {
             times,
             length: length(times, last.h),
-            start: last.start,
+            start,
             end: last.end,
+            jumps,
             rates: coefficients,
             pieces: Box::new([]),
         }
@@ -175,8 +195,18 @@ impl<const N: usize> DenseElement<N> {
             length: length(times, h),
             start: *start,
             end: *end,
+            jumps: false,
             rates: coefficients,
             pieces: Box::new([]),
+        }
+    }
+
+    /// The same with impulses behind the end of its polynomials, which lead to a state.
+    pub(crate) fn ending_in(self, end: State<N>) -> Self {
+        Self {
+            jumps: self.end != end,
+            end,
+            ..self
         }
     }
 
@@ -229,6 +259,7 @@ impl<const N: usize> DenseElement<N> {
             length: part * self.length,
             start,
             end,
+            jumps: self.jumps && to == 1.0,
             rates,
             pieces: Box::new([]),
         }
@@ -258,7 +289,7 @@ impl<const N: usize> DenseElement<N> {
         self.length
     }
 
-    /// The state at τ ∈ [0, 1]: exactly that of the nodes at both ends.
+    /// The state at τ ∈ [0, 1]: exactly that of the nodes at both ends, with impulses that act there.
     #[must_use]
     pub fn at(&self, tau: f64) -> State<N> {
         if tau == 1.0 {

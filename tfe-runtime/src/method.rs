@@ -45,6 +45,21 @@ impl<const N: usize> Interval<'_, N> {
     pub(crate) fn place(&self, impulse: &Impulse<N>) -> f64 {
         ((impulse.time - self.start) / self.length).clamp(0.0, 1.0)
     }
+
+    /// The same, and exactly 0 or 1 where only roundings of the times are between it and an end.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn node_or_place(&self, impulse: &Impulse<N>) -> f64 {
+        let (end, tau) = (self.start + self.length, self.place(impulse));
+        let largest = self.start.abs().max(end.abs()).max(self.length.abs());
+        let rounding = (16.0 * f64::EPSILON * largest / self.length.abs()).min(0.25);
+        if tau <= rounding {
+            0.0
+        } else if 1.0 - tau <= rounding {
+            1.0
+        } else {
+            tau
+        }
+    }
 }
 
 /// What is carried from step to step beside the [`Workspace`](crate::workspace::Workspace).

@@ -223,7 +223,14 @@ impl<const N: usize> DenseElement<N> {
                 }
                 Form::Hamiltonian => {
                     let others = forces.iter().skip(1).map(|force| force[a]);
-                    bounds.p[a] = along(others, (self.start.p[a], self.end.p[a]));
+                    let (start, end) = (self.start.p[a], self.end.p[a]);
+                    bounds.p[a] = along(others.clone(), (start, end));
+                    if self.jumps
+                        && let Some(mean) = forces.first()
+                    {
+                        let before = along(others, (start, start + mean[a]));
+                        bounds.p[a] = bounds.p[a].hull(before);
+                    }
                 }
             }
         }

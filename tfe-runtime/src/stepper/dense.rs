@@ -112,14 +112,36 @@ where
             return DenseElement::unknown(&scheme, (start, end), &last);
         };
         let numbers = retraced.as_ref().unwrap_or(&self.carried.numbers);
+        let (times, interval) = (
+            (start, end),
+            Interval {
+                start: last.t,
+                length: last.h,
+                impulses: &self.carried.impulses,
+            },
+        );
         if const { !M::CONSTRAINTS.is_empty() } {
             let m = interior_len(&scheme.element, M::FORM, N, M::CONSTRAINTS.len());
             let points = scheme.points() * N;
             let momenta = &numbers[3 * m + points..3 * m + 2 * points];
             let rates = &numbers[..scheme.unknowns() * N];
             let (rates, momenta) = (rates.as_chunks().0, momenta.as_chunks().0);
-            let ends = (&last.start, &last.end);
-            return DenseElement::constrained(&scheme, (start, end), last.h, ends, rates, momenta);
+            // Of impulses at the ends constraints take up a part, which is spread as what they do there.
+            let (mut start, mut end) = (last.start, last.end);
+            for impulse in interval.impulses {
+                let tau = interval.node_or_place(impulse);
+                let impulse = impulse.along(interval.length);
+                for a in 0..N {
+                    if tau == 0.0 {
+                        start.p[a] += impulse[a];
+                    } else if tau == 1.0 {
+                        end.p[a] -= impulse[a];
+                    }
+                }
+            }
+            let ends = (&start, &end);
+            let dense = DenseElement::constrained(&scheme, times, last.h, ends, rates, momenta);
+            return dense.ending_in(last.end);
         }
         // The workspace begins with the unknowns, their start and the increments.
         let m = scheme.unknowns() * width(&scheme.element, M::FORM, N);
@@ -134,12 +156,6 @@ where
                 numbers[3 * m..3 * m + scheme.points() * N].as_chunks().0,
             )
         };
-        let interval = Interval {
-            start: last.t,
-            length: last.h,
-            impulses: &self.carried.impulses,
-        };
-        let times = (start, end);
         DenseElement::of(&scheme, times, &last, rates, forces, &interval, spare)
     }
 }
