@@ -54,16 +54,56 @@ pub(crate) fn resolved(distance: f64, time: f64) -> f64 {
     }
 }
 
-/// An estimate of the error of a derivative, and the derivative.
-fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
-    /// Distances that are tried, each a quarter of the one before: down to 1e-12 of the first.
-    const SHORTER: i32 = 20;
-    /// Roundings of a function, of which the differences of both orders are made.
-    const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
+/// The derivative of a function by the time, however fast the function changes. Distances grow shorter until two that follow each other say the same: one by itself may be a multiple of a
+/// period of the function, which seems to be constant then.
+pub(crate) fn derivative_by_time(time: f64, f: &mut dyn FnMut(f64) -> f64) -> f64 {
+    /// The first distance at times about one: no simple part of usual periods.
+    const FIRST: f64 = 1.570_796e-4;
+    /// The next one, as a part of the one before: no simple part either.
+    const NEXT: f64 = 0.291;
+    /// Down to some 1e-12 of the first.
+    const TRIALS: i32 = 24;
+    /// How near to each other two derivatives are that say the same.
+    const SAME: f64 = 1e-6;
 
-    let mut best = (f64::INFINITY, f64::NAN);
-    for shorter in 0..=SHORTER {
-        let distance = distance * 0.25_f64.powi(shorter);
+    if !time.is_finite() {
+        return f64::NAN;
+    }
+    // Beside large times those within a function are rounded.
+    let first = FIRST * time.abs().max(1.0).cbrt();
+    let (mut known, mut best) = (None, (f64::INFINITY, f64::NAN));
+    for shorter in 0..TRIALS {
+        let distance = resolved(first * NEXT.powi(shorter), time);
+        let Difference {
+            sixth,
+            off,
+            roundings,
+        } = Difference::over(distance, |s| f(time + s));
+        let roundings = roundings + 4.0 * f64::EPSILON * time.abs() * sixth.abs() / distance;
+        let is_same = |known: &f64| (sixth - known).abs() <= SAME * known.abs() + roundings;
+        if let Some(known) = known.filter(is_same) {
+            return known;
+        }
+        known = (off <= (WELL_KNOWN * sixth.abs()).max(roundings)).then_some(sixth);
+        if off < best.0 || best.1.is_nan() {
+            best = (off, sixth);
+        }
+    }
+    best.1
+}
+
+/// A derivative at zero by differences of sixth order, how far that of fourth order is off, and what roundings of the function may leave.
+struct Difference {
+    sixth: f64,
+    off: f64,
+    roundings: f64,
+}
+
+impl Difference {
+    fn over(distance: f64, mut f: impl FnMut(f64) -> f64) -> Self {
+        /// Roundings of a function, of which the differences of both orders are made.
+        const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
+
         let mut largest = 0.0_f64;
         let differences: [f64; 3] = std::array::from_fn(|k| {
             let s = (k + 1) as f64 * distance;
@@ -79,8 +119,27 @@ fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
             terms.sum::<f64>() / distance
         };
         let (sixth, fourth) = (of(&SIXTH), of(&FOURTH));
-        let off = (sixth - fourth).abs();
-        let roundings = ROUNDINGS * largest / distance;
+        Self {
+            sixth,
+            off: (sixth - fourth).abs(),
+            roundings: ROUNDINGS * largest / distance,
+        }
+    }
+}
+
+/// An estimate of the error of a derivative, and the derivative.
+fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
+    /// Distances that are tried, each a quarter of the one before: down to 1e-12 of the first.
+    const SHORTER: i32 = 20;
+
+    let mut best = (f64::INFINITY, f64::NAN);
+    for shorter in 0..=SHORTER {
+        let distance = distance * 0.25_f64.powi(shorter);
+        let Difference {
+            sixth,
+            off,
+            roundings,
+        } = Difference::over(distance, &mut f);
         if off <= (WELL_KNOWN * sixth.abs()).max(roundings) {
             return (off.max(roundings), sixth);
         }
@@ -146,5 +205,34 @@ mod tests {
         }
         assert_eq!(derivative(2e-3, |_| 1.0), 0.0);
         assert!(derivative(2e-3, |_| f64::NAN).is_nan());
+    }
+
+    /// Waves of a second and of a microsecond, early and at 1e9 s; and a jump that is nearer than any usual distance.
+    #[test]
+    fn derivatives_by_the_time_are_those_of_its_own_scale() {
+        let pi = std::f64::consts::PI;
+        for (rate, time, allowed) in [
+            (1.0, 0.3, 1e-11),
+            (1.0, 1e9 + 0.5, 1e-9),
+            (500.0 * pi, 0.3, 1e-10),
+            (2e6 * pi, 3.2e-7, 1e-9),
+            // Of the phase 3e6 some 3e-10 are rounded.
+            (2e6 * pi, 0.5, 1e-6),
+            (1e-3, 7e3, 1e-8),
+        ] {
+            let found = derivative_by_time(time, &mut |t| (rate * t).sin());
+            let expected = rate * (rate * time).cos();
+            let error = (found - expected).abs() / rate;
+            assert!(error < allowed, "{rate} at {time}: {found} {expected}");
+        }
+        for (ahead, slope) in [(1e-5, 1.0), (1e-9, 1.0), (-1e-9, 3.0)] {
+            let bent = |t: f64| if t < 1.0 { t } else { 5.0 + 3.0 * t };
+            let found = derivative_by_time(1.0 - ahead, &mut |t| bent(t));
+            // Over 1e-10 the roundings of a number of eight leave 1e-5.
+            assert!((found - slope).abs() < 1e-4, "{found} for {slope}");
+        }
+        assert_eq!(derivative_by_time(2.0, &mut |_| 1.0), 0.0);
+        assert!(derivative_by_time(f64::NAN, &mut |_| 1.0).is_nan());
+        assert!(derivative_by_time(1.0, &mut |_| f64::NAN).is_nan());
     }
 }

@@ -1,6 +1,7 @@
 //! Where the inputs of a model come from.
 
 use super::table::Table;
+use crate::differences::derivative_by_time;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -62,10 +63,13 @@ impl Source<'_> {
     }
 }
 
-/// The distance of a difference by the time at which its two errors, of second order and of rounding, are alike.
-pub(super) fn distance<R: Real>(t: R) -> R {
-    const DISTANCE: f64 = 6e-6;
-    t.map(&mut |t| DISTANCE * t.abs().max(1.0).cbrt())
+/// The derivative of a function of the time, of an order: 0 is the function.
+#[cold]
+fn derivative_of(function: &dyn Fn(f64) -> f64, order: u32, t: f64) -> f64 {
+    match order {
+        0 => function(t),
+        _ => derivative_by_time(t, &mut |t| derivative_of(function, order - 1, t)),
+    }
 }
 
 impl Sources<'_> {
@@ -86,11 +90,14 @@ impl Sources<'_> {
             *value = match (held, source) {
                 (Some(held), _) => t.like(held),
                 (None, Source::Zero) => continue,
-                (None, Source::Function(function)) => t.map(&mut |t| match t.is_nan() {
-                    // What is asked for then has no inputs.
-                    true => 0.0,
-                    false => self.checked(input, t, function(t)),
-                }),
+                (None, Source::Function(function)) => {
+                    t.map_with_derivatives(&mut |order, t| match order {
+                        // At a time that is none functions are not asked.
+                        _ if t.is_nan() => t,
+                        0 => self.checked(input, t, function(t)),
+                        _ => derivative_of(&**function, order, t),
+                    })
+                }
                 (None, Source::Table(table)) => {
                     t.map_with_derivatives(&mut |order, t| table.derivative(order, t))
                 }
@@ -99,7 +106,7 @@ impl Sources<'_> {
         values
     }
 
-    /// The derivatives of all inputs by the time: of a table that of its piece, of a function a difference, good to some 1e-10 of what it does in a unit of time.
+    /// The derivatives of all inputs by the time: of a table that of its piece, of a function differences over distances that suit it.
     pub(super) fn rates<R: Real>(&self, t: R) -> [R; MAX_INPUTS] {
         let mut rates = [t.like(0.0); MAX_INPUTS];
         for ((input, source), rate) in self.each.iter().enumerate().zip(&mut rates) {
@@ -113,12 +120,11 @@ impl Sources<'_> {
             *rate = match source {
                 Source::Zero => continue,
                 Source::Function(function) => {
-                    let distance = distance(t);
-                    let (early, late) = (t - distance, t + distance);
-                    let mut ask = |t: f64| self.checked(input, t, function(t));
-                    (late.map(&mut ask) - early.map(&mut ask)) / (late - early)
+                    t.map_with_derivatives(&mut |order, t| derivative_of(&**function, order + 1, t))
                 }
-                Source::Table(table) => t.map(&mut |t| table.derivative(1, t)),
+                Source::Table(table) => {
+                    t.map_with_derivatives(&mut |order, t| table.derivative(order + 1, t))
+                }
             };
         }
         rates
@@ -199,6 +205,11 @@ mod tests {
             assert_eq!([1, 2, 3].map(|k| values[k].slope), [0.0, 3.0 * slope, 0.0]);
             assert_eq!([1, 2, 3].map(|k| rates[k]), [0.0, slope, 0.0]);
         }
+        // At a time that is none neither is a number.
+        assert_eq!(
+            sources.values(f64::NAN).map(f64::is_nan)[..4],
+            [true, true, true, false]
+        );
         // Numbers set between steps do not change with the time.
         let cells = Arc::new(Cells::new());
         cells.set(2, 7.0);

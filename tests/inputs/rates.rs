@@ -1,6 +1,7 @@
 //! Time derivatives of inputs: by them moves what a motion does where an event moves.
 
 use crate::{DRIVING, Driving, Kicked};
+use std::f64::consts::PI;
 use tfe::Driven;
 use tfe::prelude::*;
 use tfe::runtime::{By, First, Model};
@@ -41,6 +42,35 @@ fn rates_of_tables_are_those_of_their_pieces() {
                     "{way:?} at {t}: {by_time:?} for {expected}"
                 );
             }
+        }
+    }
+}
+
+/// So are those of functions of the time, whether they change in a second or in a microsecond, and at 1e9 s.
+#[test]
+fn rates_of_functions_are_those_of_their_own_scale() {
+    for (rate, t) in [(1.0, 0.3), (1.0, 1e9 + 0.5), (2e6 * PI, 3.2e-7)] {
+        let driven = Driven::new(&DRIVING)
+            .input("u", move |t| (rate * t).sin())
+            .and_then(|driven| driven.input("w", move |t| 0.5 * (rate * t).cos()))
+            .expect("inputs");
+        let (q, v) = ([0.4_f64], [0.7]);
+        let mut by_time = First::ZERO;
+        driven.first_by(By::Time, t, &q, &v, &mut by_time);
+        let (sin, cos) = (rate * t).sin_cos();
+        // As above, with the rates of w and of u.
+        let Driving { m, l, .. } = DRIVING;
+        let expected = [
+            -m * l * q[0].cos() * 0.5 * rate * sin,
+            m * l * v[0] * q[0].sin() * 0.5 * rate * sin,
+            rate * cos,
+        ];
+        let found = [by_time.z[0], by_time.q[0], by_time.force[0]];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!(
+                (found - expected).abs() < 2e-9 * rate,
+                "{rate} at {t}: {by_time:?} for {expected}"
+            );
         }
     }
 }

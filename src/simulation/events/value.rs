@@ -1,6 +1,6 @@
 //! What changes its sign at an event.
 
-use crate::differences::{derivative, derivative_of_either, resolved};
+use crate::differences::{derivative_by_time, derivative_of_either, resolved};
 use crate::length::Length;
 use crate::motion::Event;
 use crate::numbers::largest;
@@ -73,7 +73,7 @@ fn normal_of<L: Length<N>, const N: usize>(
     let of_velocity = (0..q.as_ref().len()).any(|a| function(t, q, &moved(v, a, at_v)) != here);
     let slope = |a| derivative_of_either(at_q, |s| function(t, &moved(q, a, s), v));
     let normal = L::from_fn(q, slope);
-    let drift = derivative(resolved(DISTANCE, t), |s| function(t + s, q, v));
+    let drift = derivative_by_time(t, &mut |t| function(t, q, v));
     (!of_velocity).then_some((normal, drift))
 }
 
