@@ -23,6 +23,9 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
     /// H = p·v − L, of coordinates and momenta with their velocities.
     fn energy(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
 
+    /// What that may be rounded by, where it is a difference of nearly equal numbers; zero where this is not known.
+    fn energy_rounding(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
+
     /// The outputs of a model that has any.
     fn outputs(
         &self,
@@ -95,6 +98,10 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
         legendre::energy_at(self, t, q, p, velocity)
     }
 
+    fn energy_rounding(&self, t: f64, (q, p): (&[f64; N], &[f64; N]), velocity: &[f64; N]) -> f64 {
+        legendre::energy_rounding(self, t, q, p, velocity)
+    }
+
     fn outputs(
         &self,
         t: f64,
@@ -147,6 +154,10 @@ impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
 
     fn energy(&self, t: f64, (q, p): (&Vec<f64>, &Vec<f64>), velocity: &Vec<f64>) -> f64 {
         family::energy_at(self, t, (q, p), velocity)
+    }
+
+    fn energy_rounding(&self, t: f64, (q, p): (&Vec<f64>, &Vec<f64>), velocity: &Vec<f64>) -> f64 {
+        family::energy_rounding(self, t, (q, p), velocity)
     }
 
     fn outputs(

@@ -428,3 +428,25 @@ fn a_length_that_is_a_const_parameter() {
     assert!(distance(&end.q, &expected) < 1e-14, "{end:?}");
     assert_eq!(<Small<3> as Model<3>>::SENSITIVITIES, ["w[0]"]);
 }
+
+/// 1 − cos q of a billionth is zero: what roundings leave of an energy is no jump of it, neither of a run, nor of an element of Newton's method.
+#[test]
+fn energies_that_are_roundings_do_not_jump() {
+    let model = Pendulums { w: [1.0, 4.0] };
+    let start = model.state([1e-9, 0.0], [0.0; 2]);
+    let size = |solve| {
+        let run = Simulation::new(&model).element(Mixed::<6>).step(0.3);
+        let run = run.solver(solve);
+        let ends = Ensemble::new(&model).element(Mixed::<6>).step(0.3);
+        let ends = ends.solver(solve).run(&[start], 0.0..1.5).expect("runs");
+        assert!(ends.warnings().is_empty(), "{}", ends.warnings());
+        let motion = run.run(start, 0.0..6.0).expect("a run");
+        assert_eq!(motion.warnings(), &[]);
+        assert_eq!(motion.statistics().cuts, 0);
+        motion.last().q[0]
+    };
+    for solve in [Solve::Auto, Solve::Newton] {
+        let off = size(solve) - 1e-9 * 6.0_f64.cos();
+        assert!(off.abs() < 1e-15, "{off:e}");
+    }
+}

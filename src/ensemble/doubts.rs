@@ -19,14 +19,19 @@ pub struct WarningCounts {
 }
 
 impl WarningCounts {
-    /// Of one run, by the energies at its start and its end.
-    pub(super) fn of(is_conserved: bool, before: Energy, after: Energy) -> Self {
+    /// Of one run, by the energies at its start and its end, which `rounding` says what may be rounded by.
+    pub(super) fn of(
+        is_conserved: bool,
+        before: Energy,
+        after: Energy,
+        rounding: &dyn Fn() -> f64,
+    ) -> Self {
         let kinetic = before.kinetic.max(after.kinetic);
         let is_lost = !after.energy.is_finite();
         let jumps = is_conserved
             && before.energy.is_finite()
             && !is_lost
-            && is_jump([before.energy, after.energy], kinetic);
+            && is_jump([before.energy, after.energy], kinetic, rounding);
         Self {
             energy_not_finite: usize::from(is_lost),
             energy_jump: usize::from(jumps),

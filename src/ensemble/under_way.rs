@@ -257,12 +257,15 @@ where
                 let finished = |lane: usize, result: Outcome<N, L>| {
                     let index = first + lane;
                     let model = ensemble.models.model(index);
-                    let after = result.as_ref().ok().map(|node| Energy::at(model, node));
+                    let node = result.as_ref().ok();
+                    let after = node.map(|node| Energy::at(model, node));
                     let mut results = lock(&results);
                     let (results, energies) = &mut *results;
                     let mut warnings = WarningCounts::default();
                     if let (Some(before), Some(after)) = (energies.get_mut(index), after) {
-                        warnings = WarningCounts::of(ensemble.conserves(), *before, after);
+                        let rounding = || node.map_or(0.0, |node| model.rounding_at(node));
+                        let conserves = ensemble.conserves();
+                        warnings = WarningCounts::of(conserves, *before, after, &rounding);
                         *before = after;
                     }
                     results.put(index, result, warnings);

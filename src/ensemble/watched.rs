@@ -97,7 +97,9 @@ where
             |_| WarningCounts::default(),
             |node| {
                 let before = Energy::of(model, from, start);
-                WarningCounts::of(self.conserves(), before, Energy::at(model, node))
+                let after = Energy::at(model, node);
+                let rounding = || model.rounding_at(node);
+                WarningCounts::of(self.conserves(), before, after, &rounding)
             },
         )
     }

@@ -190,6 +190,14 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
         at: (f64, &L::State),
     );
 
+    /// What the energy of a node may be rounded by; models that do not conserve it are not asked.
+    fn rounding_at(&self, node: &Node<N, L>) -> f64 {
+        match const { Self::CONSERVES } {
+            true => self.energy_rounding(node.t, (&node.q, &node.p), &node.v),
+            false => 0.0,
+        }
+    }
+
     /// The velocity that constraints leave of a momentum, looked for from a guess on.
     fn allowed_velocity(&self, t: f64, state: &L::State, guess: &L::Vector) -> Option<L::Vector>;
 

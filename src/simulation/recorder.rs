@@ -40,7 +40,7 @@ where
             follower.recorded(motion.last());
         }
         let mut watch = Watch::new(simulation.chosen_element());
-        watch.pass(Recorded::last_of(&motion, false));
+        watch.pass(Recorded::last_of(&motion, false), &|| 0.0);
         watch.add(simulation.model.weigh(motion.last()));
         Self {
             resolution: Resolution::new(simulation.again()),
@@ -81,7 +81,8 @@ where
             self.tell();
         }
         let recorded = Recorded::last_of(&self.motion, self.is_conserved);
-        self.watch.pass(recorded);
+        let node = self.motion.last();
+        self.watch.pass(recorded, &|| model.rounding_at(node));
         self.is_conserved = M::CONSERVES;
     }
 

@@ -158,7 +158,7 @@ where
         let (model, state) = (&way.model, &way.state);
         if let Some(stepper) = way.course.stepper_mut() {
             let node = M::node(stepper, model, (t0, state), &velocity);
-            watch.pass(Recorded::of(&**model, &node, false));
+            watch.pass(Recorded::of(&**model, &node, false), &|| 0.0);
             watch.add(model.weigh(&node));
             velocity = node.v;
         }
@@ -319,7 +319,8 @@ where
                 resolution.look(M::statistics(stepper), examined);
             }
             let is_conserved = !has_impulses && M::CONSERVES;
-            watch.pass(Recorded::of(&**model, &node, is_conserved));
+            let recorded = Recorded::of(&**model, &node, is_conserved);
+            watch.pass(recorded, &|| model.rounding_at(&node));
             Ok(node)
         };
         course.next(advance, |stepper| *statistics = *M::statistics(stepper))
@@ -388,7 +389,7 @@ where
     fn push(&mut self, stepper: &mut L::Stepper<'m, M>, model: &M, at: (f64, &L::State)) {
         let node = M::node(stepper, model, at, self.velocity);
         // Acts change the energy.
-        self.watch.pass(Recorded::of(model, &node, false));
+        self.watch.pass(Recorded::of(model, &node, false), &|| 0.0);
         self.velocity.clone_from(&node.v);
         self.last = node.t;
         self.rows.push(model, &node);

@@ -94,8 +94,8 @@ impl Watch {
         });
     }
 
-    /// Looks at the energy of a recorded node, whose momentum has the product p·v with its velocity.
-    pub(super) fn pass(&mut self, node: Recorded) {
+    /// Looks at the energy of a recorded node, whose momentum has the product p·v with its velocity; `rounding` says what the energy may be rounded by.
+    pub(super) fn pass(&mut self, node: Recorded, rounding: &dyn Fn() -> f64) {
         let Recorded {
             time,
             energy,
@@ -116,7 +116,7 @@ impl Watch {
         let (Some(before), true) = (last, is_conserved) else {
             return;
         };
-        if !is_jump([before, energy], self.energy.scale) {
+        if !is_jump([before, energy], self.energy.scale, rounding) {
             return;
         }
         let jump = (energy - before).abs();
@@ -157,10 +157,11 @@ impl Watch {
     }
 }
 
-/// Whether an energy that is conserved differs by more than a tenth of a kinetic energy, and than roundings.
-pub(crate) fn is_jump([before, after]: [f64; 2], kinetic: f64) -> bool {
+/// Whether an energy that is conserved differs by more than a tenth of a kinetic energy, and than roundings: of its value, and of what `more` says that each was computed with.
+pub(crate) fn is_jump([before, after]: [f64; 2], kinetic: f64, more: &dyn Fn() -> f64) -> bool {
     let rounding = 1e-9 * after.abs().max(before.abs());
-    (after - before).abs() > (0.1 * kinetic).max(rounding)
+    let jump = (after - before).abs();
+    jump > (0.1 * kinetic).max(rounding) && jump > 2.0 * more()
 }
 
 /// What is wrong with the mass matrix at the start of a run.

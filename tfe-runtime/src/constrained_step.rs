@@ -9,7 +9,7 @@ use crate::constrained::rows::Rows;
 use crate::control::START_TOLERANCE;
 use crate::equations::Span;
 use crate::error::{ConstraintError, StepError};
-use crate::evidence::{Energy, conserves_energy};
+use crate::evidence::{Energy, conserves_energy, rounding};
 use crate::legendre::largest;
 use crate::method::{Interval, Last, Memory, Method, set_kicks, total};
 use crate::model::{CoordinateName, Model, State};
@@ -185,7 +185,8 @@ where
         let velocities = [start_velocity, form.end_place(scratch.unknowns).2];
         Energy::with(method.model, (t, h), [state, &end], &velocities)
     });
-    evidence.check_with(method.control.solve, energy, element)?;
+    let rounding = || rounding(method.model, (t, h), [state, &end]);
+    evidence.check_with(method.control.solve, energy, element, &rounding)?;
     // Between steps they are those of the constraints as declared.
     if form.constraints.rows.is_combined() {
         for place in layout.multipliers() {

@@ -74,6 +74,12 @@ impl Enclosure {
         self.high
     }
 
+    /// How far the bounds are apart; zero where nothing is known.
+    pub(crate) fn width(self) -> f64 {
+        let width = self.high - self.low;
+        if width.is_finite() { width } else { 0.0 }
+    }
+
     /// 1 where all numbers are above zero, −1 where all are below, 0 where neither is certain.
     #[must_use]
     pub fn side(self) -> f64 {

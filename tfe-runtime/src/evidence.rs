@@ -4,7 +4,7 @@ use crate::control::{POSITION_ROUND_OFF, Solve};
 use crate::element::Element;
 use crate::equations::Increment;
 use crate::error::StepError;
-use crate::legendre::{energy_at, largest};
+use crate::legendre::energy_at;
 use crate::model::{Model, State};
 
 /// Whether what an iteration has found is near where it began: increments that shrink by a factor from the first one on stay in a ball around the start, and the
@@ -77,12 +77,14 @@ impl Evidence {
     }
 
     /// # Errors
-    /// [`StepError::Unproven`]; [`StepError::EnergyJump`] where the energies of start and end, which the model conserves, are too far apart even for a proven root.
+    /// [`StepError::Unproven`]; [`StepError::EnergyJump`] where the energies of start and end, which the model conserves, are too far apart even for a proven root, and by more than their
+    /// [`rounding`].
     pub(crate) fn check_with(
         &self,
         solve: Solve,
         energy: Option<Energy>,
         element: Element,
+        rounding: &dyn Fn() -> f64,
     ) -> Result<(), StepError> {
         if solve == Solve::Trusting {
             return Ok(());
@@ -96,7 +98,7 @@ impl Evidence {
         } else {
             Energy::MAX_OF_OTHERS
         };
-        if energy.is_kept(most, element) || (energy.is_rest && is_proven.is_ok()) {
+        if energy.is_kept(most, element, 0.0) || energy.is_kept(most, element, rounding()) {
             return Ok(());
         }
         is_proven?;
@@ -122,8 +124,6 @@ pub(crate) struct Energy {
     /// How much of it is kinetic at the start, or has become so: half of p·v stands for the kinetic energy.
     turned: f64,
     is_forward: bool,
-    /// Nothing has moved but for roundings, and what has changed of the energy is one.
-    is_rest: bool,
 }
 
 /// Whether energies tell anything of a model: those that conserve them. Constraints are told by their drift.
@@ -167,52 +167,47 @@ impl Energy {
         let (before, kinetic) = energies(model, t, start, first);
         let (after, moving) = energies(model, t + h, end, last);
         let potential = (after - moving) - (before - kinetic);
-        let energy = Self {
+        Self {
             before,
             after,
             turned: kinetic.abs() + potential.abs(),
             is_forward: h > 0.0,
-            is_rest: false,
-        };
-        let is_changed = (after - before).abs() > energy.allowed(Self::MAX_OF_OTHERS);
-        Self {
-            is_rest: is_changed && is_rest(h, [start, end], [first, last]),
-            ..energy
         }
     }
 
-    /// A change by so much of what was turned, and roundings.
-    fn allowed(&self, most: f64) -> f64 {
-        most * self.turned + 1e-9 * self.before.abs().max(self.after.abs())
-    }
-
-    /// Whether the energy has changed by no more than so much of what was turned. Elements that damp may lose some.
-    fn is_kept(&self, most: f64, element: Element) -> bool {
+    /// Whether the energy has changed by no more than so much of what was turned, and what is rounded. Elements that damp may lose some.
+    fn is_kept(&self, most: f64, element: Element, rounded: f64) -> bool {
         let change = self.after - self.before;
-        let allowed = self.allowed(most);
+        let rounding = 1e-9 * self.before.abs().max(self.after.abs());
+        let allowed = most * self.turned + rounding + rounded;
         let is_damped = element.family().damps() && self.is_forward;
         // NaN is not kept.
         change <= allowed && (is_damped || -change <= allowed)
     }
 }
 
-/// Whether a step moves coordinates by no more than their roundings: no other root is as near, and energies that are next to nothing are made of roundings.
+/// What the energies of both ends may be rounded by; zero where that is not known.
 #[cold]
-#[inline(never)]
-fn is_rest<const N: usize>(
-    h: f64,
+pub(crate) fn rounding<M, const N: usize>(
+    model: &M,
+    (t, h): (f64, f64),
     [start, end]: [&State<N>; 2],
-    velocities: [&[f64; N]; 2],
-) -> bool {
-    let extent = largest(&start.q).max(largest(&end.q));
-    let mut moved = 0.0_f64;
-    for a in 0..N {
-        moved = moved.max((end.q[a] - start.q[a]).abs());
-        for v in velocities {
-            moved = moved.max((h * v[a]).abs());
-        }
+) -> f64
+where
+    M: Model<N>,
+{
+    if const { !conserves_energy::<M, N>() } {
+        return 0.0;
     }
-    moved <= POSITION_ROUND_OFF * extent
+    let at = |t: f64, State { q, p }: &State<N>| {
+        #[cfg(feature = "std")]
+        if let Ok(v) = crate::legendre::velocity(model, t, q, p, &[0.0; N]) {
+            return crate::legendre::energy_rounding(model, t, q, p, &v);
+        }
+        let _ = (model, t, q, p);
+        0.0
+    };
+    at(t, start) + at(t + h, end)
 }
 
 /// The energy, and half of p·v.

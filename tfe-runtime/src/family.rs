@@ -61,6 +61,8 @@ pub use stepper::{Stepper, Suspended};
 #[cfg(feature = "sparse")]
 pub use transition::{OperatorError, TransitionOperator};
 
+#[cfg(feature = "std")]
+use crate::enclosure::Enclosure;
 use crate::legendre::largest;
 use crate::model::Form;
 use alloc::vec;
@@ -160,6 +162,21 @@ pub fn energy_at<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v: &[f64
         }
         Form::Hamiltonian => model.energy_function(t, q, p),
     }
+}
+
+/// What [`energy_at`] may be rounded by, as [`legendre::energy_rounding`](crate::legendre::energy_rounding).
+#[cfg(feature = "std")]
+#[must_use]
+#[cold]
+pub fn energy_rounding<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v: &[f64]) -> f64 {
+    let z = match M::FORM {
+        Form::Lagrangian => v,
+        Form::Hamiltonian => p,
+    };
+    let exactly = |x: &f64| Enclosure::between(*x, *x);
+    let exact = |values: &[f64]| -> Vec<Enclosure> { values.iter().map(exactly).collect() };
+    let bounds = model.energy_function(exactly(&t), &exact(q), &exact(z));
+    bounds.width()
 }
 
 /// The largest |φ| and the largest |A v + a| over the constraints; zeros where there are none.

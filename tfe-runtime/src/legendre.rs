@@ -10,6 +10,8 @@
 //! The way back is the same formula with the letters exchanged, because the transform is its own
 //! inverse. Nothing is inverted symbolically; the mass matrix is factored where it is needed.
 
+#[cfg(feature = "std")]
+use crate::enclosure::Enclosure;
 use crate::error::LegendreError;
 use crate::lu::{Block, Singular};
 use crate::model::{First, Form, Model, Second, State};
@@ -113,6 +115,28 @@ where
         Form::Hamiltonian => model.energy_function(t, q, p),
         Form::Lagrangian => dot(p, v) - model.energy_function(t, q, v),
     }
+}
+
+/// What [`energy_at`] may be rounded by, where it is a difference of nearly equal numbers, as 1 − cos q near zero: the width of the bounds of that function at (q, p). Zero where nothing is known.
+#[cfg(feature = "std")]
+#[cold]
+pub fn energy_rounding<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+    v: &[f64; N],
+) -> f64
+where
+    M: Model<N>,
+{
+    let z = match M::FORM {
+        Form::Hamiltonian => p,
+        Form::Lagrangian => v,
+    };
+    let exactly = |x: f64| Enclosure::between(x, x);
+    let bounds = model.energy_function(exactly(t), &q.map(exactly), &z.map(exactly));
+    bounds.width()
 }
 
 /// The energy H(q, p, t); for a Lagrangian p·v − L.

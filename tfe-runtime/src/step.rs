@@ -2,7 +2,7 @@
 
 use crate::equations::{Equations, Span};
 use crate::error::StepError;
-use crate::evidence::{Energy, Evidence, conserves_energy};
+use crate::evidence::{Energy, Evidence, conserves_energy, rounding};
 use crate::legendre::largest;
 use crate::method::{
     Last, cold_phase, cold_velocity, continued_ratio, end_of, may_be_phase, set_extrapolation,
@@ -137,7 +137,8 @@ where
             let energy = (impulses.is_empty() && conserves_energy::<M, N>())
                 .then(|| Energy::of(self.model, (t, h), [state, &end]))
                 .flatten();
-            evidence.check_with(self.control.solve, energy, scheme.element)?;
+            let rounding = || rounding(self.model, (t, h), [state, &end]);
+            evidence.check_with(self.control.solve, energy, scheme.element, &rounding)?;
         }
         if driver.has_factors && !(M::FACTS.linear && M::FACTS.time_dependent) {
             memory.factored = Some(h);
