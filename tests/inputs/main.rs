@@ -392,3 +392,27 @@ fn given_nodes_may_end_at_a_jump() {
     let speed = motion.last().v[0];
     assert!((speed - 1.0).abs() < 1e-12, "{speed}");
 }
+
+/// A run that goes on with another input begins with the velocity that belongs to its momentum then, p = m l (l θ̇ + w cos θ); with one that gives the same numbers it is the same run.
+#[test]
+fn runs_that_go_on_with_another_input_begin_with_its_velocity() {
+    let run = Simulation::new(&DRIVING).step(0.1);
+    let start = DRIVING.state([0.4], [0.7]);
+    let whole = run.clone().input("w", w).run(start, 0.0..1.0).unwrap();
+    let first = run.clone().input("w", w).run(start, 0.0..0.5).unwrap();
+    let checkpoint = first.checkpoint().unwrap();
+    let same = run.clone().input("w", w).resume(checkpoint, 1.0).unwrap();
+    assert_eq!(same.states(), &whole.states()[5..]);
+    let other = run.input("w", |t| w(t) + 0.2).resume(checkpoint, 1.0);
+    let other = other.unwrap();
+    let Driving { m, l, .. } = DRIVING;
+    let node = &other.states()[0];
+    let v = (node.p[0] / (m * l) - (w(0.5) + 0.2) * node.q[0].cos()) / l;
+    assert!((node.v[0] - v).abs() < 1e-12, "{} for {v}", node.v[0]);
+    assert_eq!(other.velocities()[0], node.v);
+    // The rest is the motion from there.
+    let anew = Simulation::new(&DRIVING).step(0.1);
+    let anew = anew.input("w", |t| w(t) + 0.2);
+    let anew = anew.run(*checkpoint.state(), 0.5..1.0).unwrap();
+    assert!((anew.last().q[0] - other.last().q[0]).abs() < 1e-12);
+}
