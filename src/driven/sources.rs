@@ -5,6 +5,7 @@ use crate::differences::derivative_by_time;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, ThreadId};
 use tfe_runtime::{InputFailure, InputPanicked, MAX_INPUTS, Real};
 
 /// Where an input comes from.
@@ -21,8 +22,17 @@ pub(super) struct Sources<'m> {
     pub(super) each: Vec<Source<'m>>,
     /// Numbers set between steps, which go before the others.
     pub(super) held: Option<Arc<Cells>>,
-    /// The last number of a function that was not finite.
-    failed: Arc<Mutex<Option<(usize, f64, f64)>>>,
+    /// The last numbers of functions that were not finite. Runs of one model may go on at the same time, each on a thread of its own.
+    failed: Arc<Mutex<Vec<Failed>>>,
+}
+
+/// A number that was not finite.
+#[derive(Clone, Copy)]
+struct Failed {
+    on: ThreadId,
+    input: usize,
+    time: f64,
+    value: f64,
 }
 
 /// Inputs that are set between steps.
@@ -141,8 +151,15 @@ impl Sources<'_> {
 
     #[cold]
     fn note(&self, input: usize, time: f64, value: f64) {
+        let on = thread::current().id();
         let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
-        *failed = Some((input, time, value));
+        failed.retain(|failed| failed.on != on);
+        failed.push(Failed {
+            on,
+            input,
+            time,
+            value,
+        });
     }
 
     /// Whether both are the same functions and tables, not only such as give the same numbers.
@@ -164,10 +181,14 @@ impl Sources<'_> {
         catch_unwind(AssertUnwindSafe(f)).map_err(|_| InputPanicked)
     }
 
-    /// The last number that was not finite, of inputs of these names; it is forgotten then.
+    /// The last number on this thread that was not finite, of inputs of these names; it is forgotten then.
     pub(super) fn failure(&self, names: &[&'static str]) -> Option<InputFailure> {
         let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
-        let (input, time, value) = failed.take()?;
+        let on = thread::current().id();
+        let place = failed.iter().position(|failed| failed.on == on)?;
+        let Failed {
+            input, time, value, ..
+        } = failed.swap_remove(place);
         Some(InputFailure {
             input: names.get(input)?,
             time,
@@ -205,6 +226,20 @@ mod tests {
             assert_eq!([1, 2, 3].map(|k| values[k].slope), [0.0, 3.0 * slope, 0.0]);
             assert_eq!([1, 2, 3].map(|k| rates[k]), [0.0, slope, 0.0]);
         }
+        // What has failed on another thread is told there.
+        let broken = Source::Function(Arc::new(|t: f64| 1.0 / (t - 3.0)));
+        sources.each[3] = broken;
+        std::thread::scope(|scope| {
+            let other = scope.spawn(|| {
+                sources.values(3.0_f64);
+                sources.failure(&["a", "b", "c", "d"])
+            });
+            let other = other.join().expect("a thread");
+            assert!(other.is_some_and(|failure| failure.input == "d" && failure.time == 3.0));
+            scope.spawn(|| sources.values(3.0_f64));
+        });
+        assert!(sources.failure(&["a", "b", "c", "d"]).is_none());
+        sources.each[3] = Source::Zero;
         // At a time that is none neither is a number.
         assert_eq!(
             sources.values(f64::NAN).map(f64::is_nan)[..4],
