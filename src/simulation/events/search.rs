@@ -144,7 +144,8 @@ pub(super) fn crossings(
             } else if k >= 2 {
                 // Over and back again between the samples, seen at the one before.
                 let [a, b] = [k - 2, k - 1];
-                if let Some(tau) = vertex(&times[a..=k], &column[a..=k], side)
+                let ends = (a == 0, k + 1 == times.len());
+                if let Some(tau) = vertex(&times[a..=k], &column[a..=k], side, ends)
                     && tau > times[a]
                     && side * row(&tau)[function] < 0.0
                 {
@@ -161,18 +162,27 @@ pub(super) fn crossings(
     (roots, ends)
 }
 
-/// Where a parabola through three values on one side of zero comes nearest to it.
-fn vertex(times: &[f64], column: &[f64], side: f64) -> Option<f64> {
+/// Where a parabola through three values on one side of zero comes nearest to it: about the one in the middle, or, where the first of them, or the last, is an end of the element, between that and
+/// the middle.
+fn vertex(
+    times: &[f64],
+    column: &[f64],
+    side: f64,
+    (is_first, is_last): (bool, bool),
+) -> Option<f64> {
     let ([t0, t1, t2], [f0, f1, f2]) = (
         <[f64; 3]>::try_from(times).ok()?,
         [side * column[0], side * column[1], side * column[2]],
     );
-    if !(f0 > 0.0 && f1 > 0.0 && f2 > 0.0 && f1 < f0 && f1 <= f2) {
+    let is_about_middle = f1 < f0 && f1 <= f2;
+    if !(f0 > 0.0 && f1 > 0.0 && f2 > 0.0 && (is_about_middle || is_first || is_last)) {
         return None;
     }
     let (first, second) = ((f1 - f0) / (t1 - t0), (f2 - f1) / (t2 - t1));
     let bend = (second - first) / (t2 - t0);
-    Some(0.5 * (t0 + t1) - 0.5 * first / bend)
+    let tau = 0.5 * (t0 + t1) - 0.5 * first / bend;
+    let is_at_end = (is_first && t0 < tau && tau < t1) || (is_last && t1 < tau && tau < t2);
+    (is_about_middle || bend > 0.0 && is_at_end).then_some(tau)
 }
 
 #[cfg(test)]
@@ -241,6 +251,28 @@ mod tests {
         let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
         assert!(is_near(&found, &[0.3, near]), "{found:?}");
         assert_eq!((sides, questions), (vec![1.0], 39));
+    }
+
+    /// The same beside the start and beside the end, in the narrowest part there.
+    #[test]
+    fn pairs_at_the_ends_are_found() {
+        for expected in [[1e-7, 2e-7], [1.0 - 2e-7, 1.0 - 1e-7]] {
+            let [first, second] = expected;
+            let f = |tau: f64| (tau - first) * (tau - second);
+            let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
+            let mut course = |_, (from, to): (f64, f64)| {
+                let turn = 0.5 * (first + second);
+                if to < turn || from > turn {
+                    Course::Plain
+                } else {
+                    Course::Bent
+                }
+            };
+            let (roots, sides) = crossings(&[1.0], 8, 1e-15, &values, &mut course);
+            let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
+            assert!(is_near(&found, &expected), "{found:?}");
+            assert_eq!(sides, vec![1.0]);
+        }
     }
 
     #[test]
