@@ -210,6 +210,9 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// Lets impulses act that do so between elements; whether there are any.
     fn kick(&self, impulses: &[L::Impulse], at: (f64, f64), state: &mut L::State) -> bool;
 
+    /// Lets the first ones of impulses act that may do so inside elements, as far as they act at a time; how many do.
+    fn kick_at(&self, impulses: &[Impulse<N>], at: (f64, f64), state: &mut L::State) -> usize;
+
     /// Refuses a state from which a run cannot go on.
     ///
     /// # Errors

@@ -133,17 +133,20 @@ where
         self.events.begin(h);
         // What is left of the element behind its last event.
         let (mut from, mut length) = (t, h);
+        // How many of its impulses have acted. What those at its start change is to be seen there by events; constraints take up a part of them in the element.
+        let mut acted = match M::IS_CONSTRAINED || self.events.is_empty() {
+            true => 0,
+            false => self.model.kick_at(planned.impulses, (t, h), state),
+        };
         loop {
-            let behind = if from == t {
-                0
-            } else {
-                acting::behind(planned.impulses, from, h)
-            };
+            if from != t {
+                acted = acted.max(acting::behind(planned.impulses, from, h));
+            }
             let piece = Planned {
                 t: from,
                 h: length,
                 begin: if from == t { planned.begin } else { from },
-                impulses: &planned.impulses[behind..],
+                impulses: &planned.impulses[acted..],
                 ..planned
             };
             let before = state.clone();
@@ -175,7 +178,7 @@ where
             observer.at_event(stepper, &self.model, Side::Before, (time, &at));
             observer.acted();
             let Some(After {
-                state: after,
+                state: mut after,
                 model,
             }) = after
             else {
@@ -185,6 +188,12 @@ where
             let changed = model.map_or(Ok(()), |changed| self.change(stepper, observer, changed));
             let good = changed.and_then(|()| self.model.check_restart(time, length, &after));
             good.map_err(|kind| Broken { kind, piece: None })?;
+            if time == next {
+                // Those at the end of the run have no other piece.
+                acted = acted.max(acting::behind(planned.impulses, next, h));
+                let ahead = &planned.impulses[acted..];
+                acted += self.model.kick_at(ahead, (next, h), &mut after);
+            }
             observer.at_event(stepper, &self.model, Side::After, (time, &after));
             *state = after;
             if time != next {

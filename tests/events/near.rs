@@ -391,6 +391,47 @@ fn impulses_at_the_times_of_events_act_once() {
     }
 }
 
+/// What an impulse at a node changes its sign is met there, behind the impulse, as on models of run-time length; one at the end of a run acts also where an event comes with it.
+#[test]
+fn impulses_at_nodes_are_events_at_nodes() {
+    let model = Oscillator { level: 0.0 };
+    let start = model.state([1.0], [0.0]);
+    let acts: [fn(&tfe::Occurrence<'_, 1>) -> Act<1>; 4] = [
+        |_| Act::Record,
+        |event| Act::Restart(event.state()),
+        |_| Act::Impulse([0.1]),
+        |_| Act::Stop,
+    ];
+    // v = −sin t up to there.
+    let behind = 1.0 - 0.5_f64.sin();
+    for element in [Element::mixed(6), Element::primal(4), Element::radau(4)] {
+        let run = Simulation::new(&model).element(element).step(0.1);
+        let run = run.impulse(0.5, [1.0]);
+        for (number, act) in acts.into_iter().enumerate() {
+            let run = run.clone().on("speed", Crossing::Either, act);
+            let motion = run.run(start, 0.0..0.9).expect("a run");
+            let [event] = motion.events() else {
+                panic!("{element}, {number}: {:?}", motion.events());
+            };
+            assert_eq!(event.t, 0.5, "{element}, {number}");
+            let off = (event.v[0] - behind).abs();
+            assert!(off < 1e-6 && event.rises, "{element}, {number}: {event:?}");
+            if number == 3 {
+                assert_eq!(motion.last().t, 0.5);
+                continue;
+            }
+            let kicks = if number == 2 { 1.1 } else { 1.0 };
+            let x = 0.9_f64.cos() + kicks * 0.4_f64.sin();
+            let off = (motion.last().q[0] - x).abs();
+            assert!(off < 1e-6, "{element}, {number}: {off:e}");
+        }
+        let ending = run.on("speed", Crossing::Either, |_| Act::Impulse([0.0]));
+        let motion = ending.run(start, 0.0..0.5).expect("a run");
+        let off = (motion.last().v[0] - behind).abs();
+        assert!(off < 1e-6, "{element}: {off:e}");
+    }
+}
+
 /// Directions are those of the run.
 #[test]
 fn what_falls_in_a_run_back_in_time_is_falling() {

@@ -7,7 +7,7 @@ use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
 use crate::evaluate::names;
 use crate::length::FixedLength;
-use crate::motion::{Motion, Node, Warning};
+use crate::motion::{Motion, Node, Warning, is_same_time};
 use crate::sensitivity::slopes::momentum_by;
 use std::ops::Range;
 use tfe_runtime::constrained::{self, Trail};
@@ -243,6 +243,22 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
 
     fn kick(&self, _: &[Impulse<N>], _: (f64, f64), _: &mut State<N>) -> bool {
         false
+    }
+
+    fn kick_at(&self, impulses: &[Impulse<N>], (t, h): (f64, f64), state: &mut State<N>) -> usize {
+        let is_here = |impulse: &&Impulse<N>| is_same_time(impulse.time, t);
+        let count = impulses.iter().take_while(is_here).count();
+        for impulse in &impulses[..count] {
+            for (p, change) in state.p.iter_mut().zip(impulse.value) {
+                *p += h.signum() * change;
+            }
+        }
+        if const { !M::CONSTRAINTS.is_empty() } && count > 0 {
+            // What is against the constraints these take up at once.
+            let velocity = self.allowed_velocity(t, state, &[0.0; N]);
+            state.p = velocity.map_or([f64::NAN; N], |v| Simulated::momenta(self, t, &state.q, &v));
+        }
+        count
     }
 
     fn check_restart(&self, t: f64, h: f64, state: &State<N>) -> Result<(), RunErrorKind> {

@@ -248,6 +248,10 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         is_kicked
     }
 
+    fn kick_at(&self, _: &[Impulse<0>], _: (f64, f64), _: &mut FamilyState) -> usize {
+        0
+    }
+
     fn check_restart(&self, _: f64, _: f64, state: &FamilyState) -> Result<(), RunErrorKind> {
         check_lengths(self.len(), state)
     }
