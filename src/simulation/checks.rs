@@ -32,6 +32,14 @@ pub(super) fn check_finite(q: &[f64], p: &[f64]) -> Result<(), RunErrorKind> {
     Ok(())
 }
 
+/// Refuses an impulse that is none, wherever the run goes.
+pub(super) fn check_impulse(time: f64, impulse: &[f64]) -> Result<(), RunErrorKind> {
+    if time.is_finite() && impulse.iter().all(|one| one.is_finite()) {
+        return Ok(());
+    }
+    Err(RunErrorKind::Impulse { time })
+}
+
 /// Refuses a start that is not on the constraints.
 pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
     model: &M,

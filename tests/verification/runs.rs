@@ -495,6 +495,12 @@ fn bad_arguments_are_errors() {
         kind(simulation().impulse(2.0, [1.0]), start, 0.0..1.0),
         Some(RunErrorKind::Impulse { .. })
     ));
+    // Also where a run has no end.
+    for (time, value) in [(f64::NAN, 1.0), (0.5, f64::INFINITY)] {
+        let mut steps = simulation().impulse(time, [value]).steps(start, 0.0);
+        let told = steps.next().expect("an error").expect_err("no impulse");
+        assert!(matches!(told, RunErrorKind::Impulse { .. }), "{told}");
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Models of fixed size.
 
-use super::super::checks::{check_constraints, check_start, conserves_energy};
+use super::super::checks::{check_constraints, check_impulse, check_start, conserves_energy};
 use super::super::mesh::{Grid, Mesh, within};
 use super::super::watch::{Watch, mass_signs};
 use super::{Chosen, Simulated, second};
@@ -77,8 +77,10 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         stepper.take_statistics()
     }
 
-    fn check_start(&self, start: &State<N>, _: &[Impulse<N>]) -> Result<(), RunErrorKind> {
-        check_start(start)
+    fn check_start(&self, start: &State<N>, impulses: &[Impulse<N>]) -> Result<(), RunErrorKind> {
+        check_start(start)?;
+        let mut impulses = impulses.iter();
+        impulses.try_for_each(|one| check_impulse(one.time, &one.value))
     }
 
     fn check_first(&self, (t, h): (f64, f64), start: &State<N>) -> Result<(), RunErrorKind> {

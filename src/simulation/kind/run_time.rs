@@ -1,7 +1,7 @@
 //! Models of run-time length.
 
 use super::super::acting;
-use super::super::checks::{check_finite, conserves_energies};
+use super::super::checks::{check_finite, check_impulse, conserves_energies};
 use super::super::mesh::{Grid, Mesh};
 use super::super::watch::Watch;
 use super::{Chosen, Simulated, second};
@@ -62,8 +62,9 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     ) -> Result<(), RunErrorKind> {
         self.check().map_err(RunErrorKind::Family)?;
         check_lengths(self.len(), start)?;
-        for (_, impulse) in impulses {
+        for (time, impulse) in impulses {
             check_length("of an impulse", impulse.len(), self.len())?;
+            check_impulse(*time, impulse)?;
         }
         Ok(())
     }
