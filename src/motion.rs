@@ -370,7 +370,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
 
     /// The state at a time between the nodes, from the element's own polynomial.
     ///
-    /// The polynomial starts at one node and ends at the next, so the result is continuous; between nodes its error is of order hⁿ for an
+    /// The polynomial starts at one node and ends at the next, so the result is continuous, but for momenta where impulses act at a node, which shows those before; between nodes its error is of order hⁿ for an
     /// element of n nodes, while the nodes themselves are accurate to the order of the element. So it is with constraints: at nodes they hold to round-off,
     /// between them to the order hⁿ; [`consistent_state_at`](crate::ConsistentState::consistent_state_at) projects such a state where that matters.
     ///

@@ -239,12 +239,16 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         Ok(before * (back * here.transpose()))
     }
 
-    /// By how much every column moves the time of an event: g(t*, y(t*)) = 0, so ġ dt* = −δg.
+    /// By how much every column moves the time of an event: g(t*, y(t*)) = 0, so ġ dt* = −δg. Where g has jumped over zero at the start of an
+    /// element, by an impulse or an act, it moves as that start does.
     fn times(
         &self,
         severed: &Severed<'_, 'm, N>,
         (at, rate): (&DMatrix<f64>, &DMatrix<f64>),
     ) -> Result<Vec<f64>, TransitionError> {
+        /// How far from zero it is then, as a part of what it does in a step.
+        const JUMPED: f64 = 1e-6;
+
         let event = severed.event;
         let state = event.state();
         let place = Place {
@@ -262,6 +266,11 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             t: 1.0,
             ..Change::of_column(rate, 0)
         });
+        let value = severed.watched.value.at(&*self.model, event);
+        if !severed.inside && value.abs() > JUMPED * (severed.step * by_time).abs() {
+            let still = || vec![0.0; self.columns()];
+            return Ok(self.before.start.clone().unwrap_or_else(still));
+        }
         let time = |column| {
             let change = Change {
                 parameter: self.parameter(column),

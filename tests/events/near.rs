@@ -420,6 +420,15 @@ fn impulses_at_nodes_are_events_at_nodes() {
                 assert_eq!(motion.last().t, 0.5);
                 continue;
             }
+            if number == 2 {
+                let run = run.run_linearised(start, 0.0..0.9).expect("matrices");
+                let (sin, cos) = 0.9_f64.sin_cos();
+                let product = run.product();
+                for (place, expected) in [cos, -sin, sin, cos].into_iter().enumerate() {
+                    let off = (product[(place / 2, place % 2)] - expected).abs();
+                    assert!(off < 1e-6, "{element}: {product}");
+                }
+            }
             let kicks = if number == 2 { 1.1 } else { 1.0 };
             let x = 0.9_f64.cos() + kicks * 0.4_f64.sin();
             let off = (motion.last().q[0] - x).abs();

@@ -1,7 +1,8 @@
 //! What changes its sign at an event.
 
 use crate::differences::{derivative_by_time, derivative_of_either, resolved};
-use crate::length::Length;
+use crate::evaluate::Evaluate;
+use crate::length::{FixedLength, Length};
 use crate::motion::Event;
 use crate::numbers::largest;
 use crate::sensitivity::slopes::{Along, Change};
@@ -78,6 +79,19 @@ fn normal_of<L: Length<N>, const N: usize>(
 }
 
 impl<const N: usize> Value<'_, [f64; N]> {
+    /// What it is at an event.
+    pub(in crate::simulation) fn at<M: Model<N>>(&self, model: &M, event: &Event<N>) -> f64 {
+        let Event { t, q, p, v, .. } = event;
+        match self {
+            Self::Column(column) => {
+                let mut values = vec![0.0; model.columns()];
+                <M as Evaluate<N, FixedLength>>::outputs(model, *t, (q, p), v, &mut values);
+                values[*column]
+            }
+            Self::Function(function) => function(*t, q, v),
+        }
+    }
+
     /// The change of it, where the velocity changes by `velocity`.
     pub(in crate::simulation) fn slope<M: Model<N>>(
         &self,
