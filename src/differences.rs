@@ -54,11 +54,9 @@ pub(crate) fn resolved(distance: f64, time: f64) -> f64 {
     }
 }
 
-/// The derivative of a function by the time, however fast the function changes. Distances grow shorter until two that follow each other say the same: one by itself may be a multiple of a
-/// period of the function, which seems to be constant then.
-pub(crate) fn derivative_by_time(time: f64, f: &mut dyn FnMut(f64) -> f64) -> f64 {
-    /// The first distance at times about one: no simple part of usual periods.
-    const FIRST: f64 = 1.570_796e-4;
+/// The derivative of a function by the time, however fast the function changes. Distances, the first of them at times about one `first`, grow shorter until two that follow each other say the same:
+/// one by itself may be a multiple of a period of the function, which seems to be constant then.
+pub(crate) fn derivative_by_time(first: f64, time: f64, f: &mut dyn FnMut(f64) -> f64) -> f64 {
     /// The next one, as a part of the one before: no simple part either.
     const NEXT: f64 = 0.291;
     /// Down to some 1e-12 of the first.
@@ -70,7 +68,7 @@ pub(crate) fn derivative_by_time(time: f64, f: &mut dyn FnMut(f64) -> f64) -> f6
         return f64::NAN;
     }
     // Beside large times those within a function are rounded.
-    let first = FIRST * time.abs().max(1.0).cbrt();
+    let first = first * time.abs().max(1.0).cbrt();
     let (mut known, mut best) = (None, (f64::INFINITY, f64::NAN));
     for shorter in 0..TRIALS {
         let distance = resolved(first * NEXT.powi(shorter), time);
@@ -220,19 +218,19 @@ mod tests {
             (2e6 * pi, 0.5, 1e-6),
             (1e-3, 7e3, 1e-8),
         ] {
-            let found = derivative_by_time(time, &mut |t| (rate * t).sin());
+            let found = derivative_by_time(1.570_796e-4, time, &mut |t| (rate * t).sin());
             let expected = rate * (rate * time).cos();
             let error = (found - expected).abs() / rate;
             assert!(error < allowed, "{rate} at {time}: {found} {expected}");
         }
         for (ahead, slope) in [(1e-5, 1.0), (1e-9, 1.0), (-1e-9, 3.0)] {
             let bent = |t: f64| if t < 1.0 { t } else { 5.0 + 3.0 * t };
-            let found = derivative_by_time(1.0 - ahead, &mut |t| bent(t));
+            let found = derivative_by_time(1.570_796e-4, 1.0 - ahead, &mut |t| bent(t));
             // Over 1e-10 the roundings of a number of eight leave 1e-5.
             assert!((found - slope).abs() < 1e-4, "{found} for {slope}");
         }
-        assert_eq!(derivative_by_time(2.0, &mut |_| 1.0), 0.0);
-        assert!(derivative_by_time(f64::NAN, &mut |_| 1.0).is_nan());
-        assert!(derivative_by_time(1.0, &mut |_| f64::NAN).is_nan());
+        let constant = |time: f64, value: f64| derivative_by_time(1e-3, time, &mut |_| value);
+        assert_eq!(constant(2.0, 1.0), 0.0);
+        assert!(constant(f64::NAN, 1.0).is_nan() && constant(1.0, f64::NAN).is_nan());
     }
 }

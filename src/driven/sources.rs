@@ -76,9 +76,11 @@ impl Source<'_> {
 /// The derivative of a function of the time, of an order: 0 is the function.
 #[cold]
 fn derivative_of(function: &dyn Fn(f64) -> f64, order: u32, t: f64) -> f64 {
+    /// No simple part of usual periods, and so short that functions are asked hardly beyond a span.
+    const FIRST: f64 = 1.570_796e-4;
     match order {
         0 => function(t),
-        _ => derivative_by_time(t, &mut |t| derivative_of(function, order - 1, t)),
+        _ => derivative_by_time(FIRST, t, &mut |t| derivative_of(function, order - 1, t)),
     }
 }
 

@@ -25,6 +25,9 @@ pub(in crate::simulation) enum Value<'m, V> {
 /// A distance for differences, relative to what is changed: their error is below roundings, and these are some 1e-13.
 const DISTANCE: f64 = 2e-3;
 
+/// The same in time: no simple part of usual periods.
+const DISTANCE_IN_TIME: f64 = 1.570_796e-3;
+
 impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
     /// The gradient g_q, and g_t; none where g depends on velocities.
     pub(super) fn normal<M, L, const N: usize>(
@@ -74,7 +77,7 @@ fn normal_of<L: Length<N>, const N: usize>(
     let of_velocity = (0..q.as_ref().len()).any(|a| function(t, q, &moved(v, a, at_v)) != here);
     let slope = |a| derivative_of_either(at_q, |s| function(t, &moved(q, a, s), v));
     let normal = L::from_fn(q, slope);
-    let drift = derivative_by_time(t, &mut |t| function(t, q, v));
+    let drift = derivative_by_time(DISTANCE_IN_TIME, t, &mut |t| function(t, q, v));
     (!of_velocity).then_some((normal, drift))
 }
 
