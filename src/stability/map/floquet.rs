@@ -5,9 +5,9 @@ use crate::numbers::{larger, largest};
 use crate::stability::{eigenvalues, largest_modulus};
 use nalgebra::DMatrix;
 use tfe_runtime::scheme::{SchemeTable, Tables};
-use tfe_runtime::step::{Control, Interval, Memory, Method};
+use tfe_runtime::step::{Control, Interval, Memory, Method, Solve};
 use tfe_runtime::workspace::{Workspace, numbers_len, pivots_len, transition_len};
-use tfe_runtime::{Element, Model, State};
+use tfe_runtime::{Element, Model, State, StepError};
 
 impl MapPlan {
     /// The map of the largest modulus of a Floquet multiplier of models about rest, q = 0 and p = 0: above one rest is unstable.
@@ -68,6 +68,13 @@ impl MapPlan {
     }
 }
 
+/// Ends with the first increment: the solution of the equations linearised at rest.
+const ONCE: Control = Control {
+    tolerance: f64::INFINITY,
+    max_iterations: 1,
+    solve: Solve::Newton,
+};
+
 #[derive(Clone, Copy)]
 struct Period {
     period: f64,
@@ -122,6 +129,11 @@ impl<'a, const N: usize> Monodromy<'a, N> {
             tables: self.tables,
             control: Control::default(),
         };
+        let once = Method {
+            model,
+            tables: self.tables,
+            control: ONCE,
+        };
         let mut memory = Memory::new();
         self.set_identity();
         for element in 0..period.elements {
@@ -135,9 +147,13 @@ impl<'a, const N: usize> Monodromy<'a, N> {
                 q: [0.0; N],
                 p: [0.0; N],
             };
-            method
-                .advance(&mut memory, self.workspace(), interval, &mut state)
-                .map_err(|source| FloquetError::Step { element, source })?;
+            let mut advanced = method.advance(&mut memory, self.workspace(), interval, &mut state);
+            if let Err(StepError::NewtonStalled { .. } | StepError::Unproven { .. }) = advanced {
+                // Roundings of forces that hold each other may push it to and fro for ever. How far they push is told by one solution.
+                let again = once.advance(&mut memory, self.workspace(), interval, &mut state);
+                advanced = again.or(advanced);
+            }
+            advanced.map_err(|source| FloquetError::Step { element, source })?;
             let workspace = Workspace {
                 numbers: &mut self.numbers,
                 pivots: &mut self.pivots,
