@@ -13,6 +13,7 @@ mod derivative;
 mod error;
 mod mesh;
 mod newton;
+mod resolved;
 mod solution;
 
 pub use error::AssemblyError;

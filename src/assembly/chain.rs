@@ -248,6 +248,11 @@ impl Chain {
         &self.globals[side * g..(side + 1) * g]
     }
 
+    /// How near the equations are to singular ones, after a successful [`solve`](Self::solve): the smallest pivot of those that are left for the ends and the global unknowns, beside the largest.
+    pub(crate) fn smallest_pivot(&self) -> f64 {
+        self.closing.smallest()
+    }
+
     /// The sign of the determinant of all equations: 1 or −1 after a successful [`solve`](Self::solve), otherwise 0.
     ///
     /// The rows are those of the links, the closure and the dense rows, the columns y_0, …, y_E, γ, in these orders. Along

@@ -47,6 +47,11 @@ impl Size {
         unsolved: f64::INFINITY,
     };
 
+    /// The largest part of the whole iterate.
+    pub(super) fn whole(self) -> f64 {
+        self.whole
+    }
+
     /// The same with a correction of something else, beside the size of that. What is not a number stays so.
     pub(crate) fn and(self, other: f64) -> Self {
         Self {

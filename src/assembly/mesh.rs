@@ -39,6 +39,15 @@ impl Mesh {
         Ok(Self { fractions })
     }
 
+    /// With each element in two halves.
+    pub(crate) fn halved(&self) -> Self {
+        let pairs = self.fractions.windows(2);
+        let starts = pairs.flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]);
+        Self {
+            fractions: starts.chain([1.0]).collect(),
+        }
+    }
+
     /// The number of elements.
     pub(crate) fn elements(&self) -> usize {
         self.fractions.len() - 1

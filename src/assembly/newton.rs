@@ -371,8 +371,13 @@ impl<const N: usize> Assembly<N> {
         })
     }
 
+    /// How near the last system is to a singular one.
+    pub(super) fn smallest_pivot(&self) -> f64 {
+        self.chain.smallest_pivot()
+    }
+
     /// The correction beside the iterate.
-    fn size<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> Size {
+    pub(super) fn size<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> Size {
         let nodes = iterate.nodes.iter().enumerate();
         let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], self.chain.node(e)));
         let globals = self.chain.globals().iter().enumerate();

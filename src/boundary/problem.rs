@@ -259,6 +259,9 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
 
     /// Finds the motion.
     ///
+    /// Between conjugate points, as of an oscillator after half a period, all coordinates at both ends have no solution, or a whole family. Elements are off by a little, and have one that
+    /// is as large as that is small: what elements of half the length do not leave as it is, is [`AssemblyError::Singular`].
+    ///
     /// # Errors
     /// [`BoundaryError`]: the conditions make no sense, or there is no solution near the guess.
     pub fn solve(&self) -> Result<BoundaryMotion<'m, M, N>, BoundaryError> {
@@ -276,21 +279,33 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         let mut iterate = assembly
             .along(&problem, curve, Vec::new())
             .map_err(AssemblyError::Legendre)?;
-        assembly.solve(&mut problem, &mut iterate, self.control)?;
-        Ok(BoundaryMotion {
-            solution: Solution {
-                model: self.model,
-                element: self.element,
-                mesh: problem.mesh,
-                start: self.span.start,
-                length: self.span.end - self.span.start,
-                end: self.span.end,
-                damping: 0.0,
-                transitions: assembly.transitions().to_vec(),
-                statistics: assembly.statistics(),
-                iterate,
-            },
-        })
+        assembly
+            .solve(&mut problem, &mut iterate, self.control)
+            .map_err(|error| assembly.explained(error))?;
+        let halves = Spanned {
+            mesh: problem.mesh.halved(),
+            ..self.problem()?
+        };
+        let solution = Solution {
+            model: self.model,
+            element: self.element,
+            mesh: problem.mesh,
+            start: self.span.start,
+            length: self.span.end - self.span.start,
+            end: self.span.end,
+            damping: 0.0,
+            transitions: assembly.transitions().to_vec(),
+            statistics: assembly.statistics(),
+            iterate,
+        };
+        // Where all is given at one end no span is singular.
+        let at_end = self.conditions.iter().filter(|one| one.at_end).count();
+        if (1..2 * N).contains(&at_end) && assembly.is_doubtful() {
+            let motion = solution.motion();
+            let along = |t: f64| along_motion(self.model, &motion, t);
+            assembly.check_resolved(self.element, (&halves, 2 * self.elements), along)?;
+        }
+        Ok(BoundaryMotion { solution })
     }
 
     pub(super) fn problem(&self) -> Result<Spanned<'_, M, N>, BoundaryError> {

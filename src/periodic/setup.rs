@@ -24,7 +24,8 @@ pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
 
 /// A periodic orbit to be found.
 ///
-/// - *Forced*: the model depends on time, its [`period`](Self::period) T is known. The default guess, rest, is enough for linear models.
+/// - *Forced*: the model depends on time, its [`period`](Self::period) T is known. The default guess, rest, is enough for linear models. At resonance without damping there is none:
+///   [`AssemblyError::Singular`].
 /// - *Autonomous with damping or forces*: isolated orbits; T is unknown ([`unknown_period`](Self::unknown_period)) and a [`Phase`] is chosen.
 /// - *Conservative*: orbits come in families. Give the period, or with an unknown one the [`energy`](Self::energy) (that of the guess if none
 ///   is given). The equations are made regular by an unfolding force γ v, which vanishes in the solution ([`Orbit::unfolding`]).
@@ -277,7 +278,11 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             .along(&problem, &curve, globals)
             .map_err(AssemblyError::Legendre)?;
         let guess = extent_of(&iterate);
-        let solved = assembly.solve(&mut problem, &mut iterate, self.control);
+        let mut solved = assembly.solve(&mut problem, &mut iterate, self.control);
+        if !autonomous {
+            solved = (solved.map_err(|error| assembly.explained(error)))
+                .and_then(|()| self.check_resolved(&problem, &iterate, &assembly));
+        }
         let solved = (solved.map_err(OrbitError::from)).and_then(|()| problem.check());
         // Where a phase is asked for, a motion is.
         if problem.phase.is_some()
@@ -290,6 +295,33 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         }
         solved?;
         Ok((problem, iterate, assembly))
+    }
+
+    /// Refuses a forced orbit that elements of half the length do not leave as it is: one at resonance.
+    fn check_resolved(
+        &self,
+        problem: &Periodic<'_, M, N>,
+        iterate: &Iterate<N>,
+        assembly: &Assembly<N>,
+    ) -> Result<(), AssemblyError> {
+        if !assembly.is_doubtful() {
+            return Ok(());
+        }
+        let halves = Periodic {
+            model: problem.model,
+            mesh: problem.mesh.halved(),
+            start: problem.start,
+            period: problem.period,
+            unfolding: problem.unfolding,
+            inertia: problem.inertia,
+            globals: Vec::new(),
+            advance: problem.advance,
+            phase: None,
+            energy: None,
+        };
+        let motion = self.motion_of(problem, iterate);
+        let along = |t: f64| along_motion(self.model, &motion, t);
+        assembly.check_resolved(self.element, (&halves, 2 * self.elements), along)
     }
 
     /// The motion of an iterate, with the polynomials of its elements.

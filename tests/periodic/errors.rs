@@ -1,7 +1,7 @@
 //! What makes no sense, or has no solution, is a typed error.
 
 use crate::models::{Duffing, Pendulum, Projectile, VanDerPol};
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 use tfe::boundary::{BoundaryError, Component};
 use tfe::periodic::{OrbitError, Phase};
 use tfe::prelude::*;
@@ -251,6 +251,39 @@ fn boundary_values_that_are_ill_posed() {
         .solve()
         .expect("an arc");
     assert!((solved.start().q[1] + 2.0 + 0.5 * 9.81).abs() < 1e-13);
+}
+
+/// An undamped oscillator has no orbit of the period of its own: elements are off by 4e-6 (ten) to 9e-10 (forty) of it, and have one as large as that is small. A little damping makes one, of
+/// x = f/δ sin t, which is as large and right.
+#[test]
+fn resonance_without_damping_has_no_orbit() {
+    let forced = |delta: f64| Duffing {
+        alpha: 1.0,
+        beta: 0.0,
+        delta,
+        f: 0.3,
+        omega: 1.0,
+    };
+    let undamped = forced(0.0);
+    for elements in [10, 40] {
+        let error = PeriodicOrbit::of(&undamped)
+            .elements(elements)
+            .period(TAU)
+            .solve();
+        assert!(
+            matches!(
+                error,
+                Err(OrbitError::Assembly(AssemblyError::Singular { .. }))
+            ),
+            "{elements}: {:?}",
+            error.map(|orbit| orbit.start())
+        );
+    }
+    let damped = forced(1e-4);
+    let orbit = PeriodicOrbit::of(&damped).period(TAU).solve();
+    let start = orbit.expect("an orbit").start();
+    // 9e-10 of the phase beside 3e-4 that damping takes of the amplitude.
+    assert!((start.p[0] / 3000.0 - 1.0).abs() < 1e-5, "{start:?}");
 }
 
 /// What falls gains momentum: no correction changes that, and only the coordinate can be closed.

@@ -23,6 +23,8 @@ pub(super) struct Closing {
     order: Vec<usize>,
     /// The solution, unknown by unknown, with the right sides side by side.
     solution: Vec<f64>,
+    /// The smallest pivot beside the largest.
+    smallest: f64,
 }
 
 impl Closing {
@@ -36,6 +38,7 @@ impl Closing {
             column_scales: vec![1.0; size],
             order: (0..size).collect(),
             solution: vec![0.0; size * shape.rights],
+            smallest: 0.0,
         }
     }
 
@@ -86,6 +89,7 @@ impl Closing {
         }
         let mut sign = 1.0;
         let mut largest = 0.0;
+        self.smallest = 1.0;
         for step in 0..n {
             let (row, column, size) = self.pivot(step);
             if step == 0 {
@@ -99,6 +103,7 @@ impl Closing {
                     pivot,
                 });
             }
+            self.smallest = self.smallest.min(size / largest);
             if self.bring_to_front(step, row, column) {
                 sign = -sign;
             }
@@ -168,6 +173,11 @@ impl Closing {
                 *out = *x * self.column_scales[unknown];
             }
         }
+    }
+
+    /// The smallest pivot beside the largest, of equations that were solved.
+    pub(super) fn smallest(&self) -> f64 {
+        self.smallest
     }
 
     /// The solution (ŷ_0, ŷ_E, γ) of one right side.
