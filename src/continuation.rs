@@ -32,6 +32,7 @@ mod error;
 mod events;
 mod follow;
 mod problem;
+mod progress;
 
 pub use branch::{Branch, End, Event, Point, Tangent};
 pub use error::{ContinuationError, ContinuationErrorKind};
@@ -39,8 +40,9 @@ pub use events::EventKind;
 
 use crate::periodic::{PeriodicOrbit, Phase};
 use arc::Row;
-use follow::{Course, Follower, Progress, Steps};
+use follow::{Course, Follower, Steps};
 use problem::{Continued, Field, PeriodOf};
+use progress::Progress;
 use std::ops::Range;
 use tfe_runtime::{Element, Model, State};
 

@@ -68,7 +68,7 @@ pub struct Event<const N: usize> {
     pub kind: EventKind,
     /// The orbit there.
     pub point: Point<N>,
-    /// The event lies between this place of [`Branch::points`] and the next.
+    /// The event lies between this place of [`Branch::points`] and the next, or at this place itself.
     pub after: usize,
     /// How far the parameter is known: the size of the last interval in which the sign of the test function changed. Where another branch
     /// crosses, the equations are singular; the orbit there is interpolated, and this is the difference of two interpolations.

@@ -104,6 +104,32 @@ impl Tests {
     }
 }
 
+/// The signs that the test functions had last along a branch, where they were more than round-off; zero where they were not yet.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Signs {
+    last: [f64; 4],
+}
+
+impl Signs {
+    /// Takes the next orbit of the branch.
+    pub(super) fn pass(&mut self, tests: &Tests) {
+        for (last, value) in self.last.iter_mut().zip(tests.values) {
+            if value.abs() > ROUND_OFF {
+                *last = value.signum();
+            }
+        }
+    }
+
+    /// The events at an orbit itself, the last that was passed: test functions that are round-off there, and have the other sign at the next one.
+    pub(super) fn changes_at(&self, at: &Tests, next: &Tests) -> impl Iterator<Item = EventKind> {
+        let (signs, at, next) = (self.last, *at, *next);
+        EventKind::ALL.into_iter().filter(move |kind| {
+            let (sign, next) = (signs[*kind as usize], next.value(*kind));
+            at.value(*kind).abs() <= ROUND_OFF && next.abs() > ROUND_OFF && sign * next < 0.0
+        })
+    }
+}
+
 /// A function that vanishes identically, because multipliers are tied to each other, is not larger than this.
 const ROUND_OFF: f64 = 1e-9;
 
@@ -211,6 +237,33 @@ mod tests {
             )
         };
         check(&pair(0.9), &pair(1.1), &[EventKind::Torus]);
+    }
+
+    #[test]
+    fn an_event_at_an_orbit_itself_is_one() {
+        let along = |slopes: &[f64]| {
+            let orbits: Vec<Tests> = (slopes.iter())
+                .map(|slope| at(*slope, &[multiplier(0.9 + 0.1 * (1.0 - slope), 0.0)]))
+                .collect();
+            let mut signs = Signs::default();
+            let mut found = Vec::new();
+            for (place, pair) in orbits.windows(2).enumerate() {
+                signs.pass(&pair[0]);
+                let at_first = signs.changes_at(&pair[0], &pair[1]);
+                found.extend(at_first.map(|kind| (place, kind)));
+                let between = pair[0].changes(&pair[1]);
+                found.extend(between.map(|kind| (place, kind)));
+            }
+            found
+        };
+        let fold = EventKind::Fold;
+        assert_eq!(along(&[0.2, 0.1, -0.1, -0.2]), [(1, fold)]);
+        assert_eq!(along(&[0.2, 0.1, 0.0, -0.1, -0.2]), [(2, fold)]);
+        assert_eq!(along(&[-0.2, 1e-12, 0.1]), [(1, fold)]);
+        // One that begins there, touches, or ends there does not turn.
+        for slopes in [&[0.0, -0.1, -0.2][..], &[0.1, 0.0, 0.1], &[0.1, 0.0]] {
+            assert!(along(slopes).is_empty(), "{slopes:?}");
+        }
     }
 
     #[test]

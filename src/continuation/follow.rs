@@ -3,8 +3,9 @@
 use super::arc::{Between, Metric, Row};
 use super::branch::{Branch, End, Event, Frame, Member, Point, Tangent, amplitudes};
 use super::error::ContinuationErrorKind;
-use super::events::{Circumstances, EventKind, Tests, is_torus};
+use super::events::{Circumstances, EventKind, Signs, Tests, is_torus};
 use super::problem::Continued;
+use super::progress::Progress;
 use crate::assembly::{Assembly, AssemblyError, Control, Iterate, Problem};
 use crate::periodic::OrbitError;
 use crate::periodic::orbit::{multipliers_of, trivial_of};
@@ -94,6 +95,8 @@ pub(super) struct Follower<'c, M, const N: usize> {
     metric: Metric<N>,
     frame: Frame<N>,
     last: Solved<M, N>,
+    /// Of the test functions up to the last orbit.
+    signs: Signs,
 }
 
 impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
@@ -129,7 +132,10 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             unfolded: problem.orbit.globals.contains(&Global::Unfolding),
         };
         let last = solved(&problem, &assembly, iterate, tangent, assembly.iterations())?;
+        let mut signs = Signs::default();
+        signs.pass(&last.tests);
         Ok(Self {
+            signs,
             problem,
             assembly,
             // A step that needs more is too long.
@@ -238,6 +244,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
     /// Goes on from an orbit.
     fn accept(&mut self, next: Solved<M, N>) {
         self.last = next;
+        self.signs.pass(&self.last.tests);
         self.metric.grow(&self.last.member.iterate);
         // The length of a vector has changed.
         self.last.tangent = self.metric.unit(self.last.tangent.clone());
@@ -316,12 +323,20 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         Ok((solved, turn))
     }
 
-    /// Looks for events between the last orbit and the next, and records them.
+    /// Looks for events at the last orbit and between that and the next, and records them.
     fn find_events(&mut self, next: &Solved<M, N>, branch: &mut Branch<M, N>) {
-        let kinds: Vec<EventKind> = self.last.tests.changes(&next.tests).collect();
+        let at_last = self.signs.changes_at(&self.last.tests, &next.tests);
+        let at_last = at_last.map(|kind| (kind, true));
+        let between = self.last.tests.changes(&next.tests);
+        let kinds: Vec<(EventKind, bool)> =
+            at_last.chain(between.map(|kind| (kind, false))).collect();
         let mut found: Vec<(EventKind, Located<M, N>)> = Vec::new();
-        for kind in kinds {
-            let located = self.locate(next, kind);
+        for (kind, is_at_last) in kinds {
+            let located = if is_at_last {
+                self.at_last(next, kind)
+            } else {
+                self.locate(next, kind)
+            };
             let floquet = &located.solved.floquet;
             let trivial = trivial_of(floquet, self.frame.trivial);
             if kind != EventKind::Torus || is_torus(floquet, &trivial) {
@@ -337,6 +352,23 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
                 width: at.width,
             });
             branch.event_members.push(at.solved.member);
+        }
+    }
+
+    /// The last orbit, where a test function vanishes.
+    fn at_last(&mut self, next: &Solved<M, N>, kind: EventKind) -> Located<M, N> {
+        if kind == EventKind::Branch {
+            let between = self.between(next);
+            if let Ok(crossing) = self.crossing(&between, 0.0) {
+                return crossing;
+            }
+        }
+        let [here, there] = [&self.last, next].map(|end| end.tests.value(kind).abs());
+        let distance = (next.parameter() - self.last.parameter()).abs();
+        Located {
+            part: 0.0,
+            solved: self.last.clone(),
+            width: distance * (here / there),
         }
     }
 
@@ -542,42 +574,3 @@ const MOST_TURN: f64 = 0.906;
 
 /// The cosine of 10°: below this angle steps may grow.
 const EASY_TURN: f64 = 0.985;
-
-/// A line on standard error, rewritten once a second.
-pub(super) struct Progress {
-    shown: Option<std::time::Instant>,
-    is_dirty: bool,
-}
-
-impl Progress {
-    pub(super) fn new(wanted: bool) -> Self {
-        Self {
-            shown: wanted.then(std::time::Instant::now),
-            is_dirty: false,
-        }
-    }
-
-    fn show(&mut self, points: usize, parameter: f64) {
-        use std::io::Write;
-        let Some(shown) = &mut self.shown else { return };
-        if shown.elapsed().as_secs() < 1 {
-            return;
-        }
-        *shown = std::time::Instant::now();
-        self.is_dirty = true;
-        // Progress that cannot be shown is no reason to stop.
-        let _ = write!(
-            std::io::stderr(),
-            "\r{points} orbits, parameter {parameter:.6} "
-        );
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        if self.is_dirty {
-            use std::io::Write;
-            let _ = writeln!(std::io::stderr());
-        }
-    }
-}
