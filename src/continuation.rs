@@ -226,7 +226,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         self
     }
 
-    /// The largest step in arc length: how far apart points are at most. A twentieth of the range by default.
+    /// The largest step in arc length: how far apart points are at most. A twentieth of the range by default, or the first step where that is longer.
     #[must_use]
     pub fn largest_step(mut self, step: f64) -> Self {
         self.largest = Some(step);
@@ -313,19 +313,19 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         if !(width.is_finite() && inside) {
             return Err(ContinuationErrorKind::Range { start, end, value });
         }
-        let largest = self.largest.unwrap_or(0.05 * width);
-        let steps = Steps {
-            first: self.step.unwrap_or((0.01 * width).min(largest)),
-            smallest: self.smallest.unwrap_or((1e-6 * width).min(largest)),
-            largest,
-        };
-        let Steps {
-            first, smallest, ..
-        } = steps;
+        // What is given decides on the others.
+        let step = self.step.unwrap_or(0.0);
+        let largest = self.largest.unwrap_or((0.05 * width).max(step));
+        let smallest = (1e-6 * width)
+            .min(self.step.unwrap_or(largest))
+            .min(largest);
+        let smallest = self.smallest.unwrap_or(smallest);
+        let default = (0.01 * width).max(smallest).min(largest);
+        let first = self.step.unwrap_or(default);
         let positive = [first, smallest, largest]
             .iter()
             .all(|step| step.is_finite() && *step > 0.0);
-        if !(positive && smallest <= largest) {
+        if !(positive && smallest <= first && first <= largest) {
             return Err(ContinuationErrorKind::Steps {
                 step: first,
                 smallest,
@@ -334,7 +334,11 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         }
         Ok(Course {
             range: start..end,
-            steps,
+            steps: Steps {
+                first,
+                smallest,
+                largest,
+            },
             max_points: self.max_points,
         })
     }

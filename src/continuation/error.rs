@@ -28,7 +28,7 @@ pub enum ContinuationErrorKind {
         /// The value of the model.
         value: f64,
     },
-    /// The steps are not positive and finite, or the smallest is larger than the largest.
+    /// The steps are not positive and finite, or the first is not between the smallest and the largest.
     Steps {
         /// The first step.
         step: f64,
@@ -82,7 +82,7 @@ impl fmt::Display for ContinuationErrorKind {
                 largest,
             } => write!(
                 f,
-                "the steps (first {step}, smallest {smallest}, largest {largest}) must be positive and finite, the smallest below the largest"
+                "the steps (first {step}, smallest {smallest}, largest {largest}) must be positive and finite, the first between the smallest and the largest"
             ),
             Self::Start(error) => write!(f, "no orbit at the start of the branch: {error}"),
             Self::Step {

@@ -51,11 +51,11 @@ pub enum OrbitError {
     },
     /// Orbits with events are not found for models with constraints: minimal coordinates are needed.
     HybridConstraints,
-    /// Something was asked for that models of this kind cannot do.
+    /// Something was asked for that models of this kind cannot do, or that has no meaning for orbits of this kind.
     Unsupported {
         /// The call.
         call: &'static str,
-        /// The kind of models.
+        /// The kind of models, or of orbits.
         of: &'static str,
     },
     /// The motion that was found does not move: an equilibrium, which repeats after any time, or a period that shrinks to nothing.

@@ -44,6 +44,7 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
         if !(autonomous || known) {
             return Err(OrbitError::ForcedPeriod);
         }
+        self.check_energy(conservative)?;
         let mesh = Mesh::new(self.elements, &self.weights)?;
         let nodes = self.nodes(&mesh, period)?;
         let mut shooting =

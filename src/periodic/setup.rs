@@ -173,7 +173,7 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         self
     }
 
-    /// The energy of the orbit of a conservative model with unknown period.
+    /// The energy of the orbit of a conservative model with unknown period. Of other orbits it does not decide, and is refused: [`OrbitError::Unsupported`].
     #[must_use]
     pub fn energy(mut self, energy: f64) -> Self {
         self.energy = Some(energy);
@@ -202,6 +202,18 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.control.max_iterations = iterations;
         self
+    }
+
+    /// Refuses an energy where something else decides on it.
+    pub(super) fn check_energy(&self, conservative: bool) -> Result<(), OrbitError> {
+        let of = match (self.energy, self.period) {
+            (None, _) => return Ok(()),
+            (Some(_), Period::Known(_)) => "orbits of a known period",
+            (Some(_), _) if conservative => return Ok(()),
+            (Some(_), _) => "orbits of models with forces or dissipation",
+        };
+        let call = "energy";
+        Err(OrbitError::Unsupported { call, of })
     }
 
     pub(super) fn checked_phase(&self, coordinates: usize) -> Result<Phase, OrbitError> {
@@ -253,6 +265,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             }
             problem.globals.push(Global::Period);
         }
+        self.check_energy(conservative)?;
         if autonomous && !at_rest {
             problem.phase = Some(self.checked_phase(N)?);
             if conservative || problem.globals.is_empty() {

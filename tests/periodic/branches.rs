@@ -135,6 +135,35 @@ fn periods_change_as_they_do_beside_poles() {
     close(slope * omega * omega / TAU, -1.0, 1e-8);
 }
 
+/// A first step that is longer than a twentieth of the range is made; one that contradicts the others is told.
+#[test]
+fn the_first_step_is_the_one_that_was_asked_for() {
+    let model = Beside {
+        large: 0.0,
+        omega: 5.0,
+    };
+    let continuation = || {
+        Continuation::of(&model)
+            .parameter(|model| &mut model.omega)
+            .range(5.0..6.0)
+            .elements(20)
+            .period(|model| TAU / model.omega)
+    };
+    let branch = continuation().step(0.2).max_points(2).run();
+    let branch = branch.expect("a branch");
+    // Of arc length, in which the small response x = −1/2 cos(ωt)/(ω² − 1) counts a tenth: 0.19.
+    let step = branch.points()[1].parameter - 5.0;
+    assert!((0.15..0.2).contains(&step), "{step}");
+    for (step, smallest, largest) in [(0.2, 1e-3, 0.1), (0.01, 0.02, 0.1), (0.1, 0.2, 0.05)] {
+        let steps = continuation().step(step).smallest_step(smallest);
+        let error = steps.largest_step(largest).run().expect_err("no branch");
+        assert!(
+            matches!(error.kind(), ContinuationErrorKind::Steps { .. }),
+            "{error}"
+        );
+    }
+}
+
 #[test]
 fn parameters_that_are_no_numbers_are_told() {
     for omega in [f64::NAN, f64::INFINITY] {

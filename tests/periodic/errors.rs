@@ -61,6 +61,28 @@ fn orbits_that_are_ill_posed() {
     );
 }
 
+/// Something else decides on the energy: the period, or forces.
+#[test]
+fn an_energy_that_does_not_decide_is_refused() {
+    let (pendulum, cycle) = (Pendulum {}, VanDerPol { mu: 1.0 });
+    let known = PeriodicOrbit::of(&pendulum)
+        .period(7.0)
+        .energy(-0.5)
+        .guess_from(pendulum.state([1.0], [0.0]))
+        .solve();
+    let forced = PeriodicOrbit::of(&cycle)
+        .unknown_period(6.6)
+        .energy(2.0)
+        .guess(|t| ([2.0 * t.cos()], [-2.0 * t.sin()]))
+        .solve();
+    for error in [known.err(), forced.err()] {
+        assert!(
+            matches!(error, Some(OrbitError::Unsupported { call: "energy", .. })),
+            "{error:?}"
+        );
+    }
+}
+
 #[test]
 fn orbits_that_do_not_exist() {
     let pendulum = Pendulum {};
