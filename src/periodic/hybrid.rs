@@ -6,6 +6,7 @@ use super::phase::Period;
 use super::problem::force_at;
 use super::rest::{Extent, is_at_rest};
 use super::setup::PeriodicOrbit;
+use crate::assembly::MeshError;
 use crate::linearised::Linearised;
 use crate::motion::{Motion, Setting};
 use crate::numbers::{larger, largest};
@@ -16,7 +17,7 @@ use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// An orbit of a simulation with [events](Simulation::on) that change the state: an oscillator that hits a wall, a machine that switches. The simulation brings model, element and events;
-    /// the orbit its steps.
+    /// the orbit its steps. Of models with constraints no such orbits are found ([`OrbitError::HybridConstraints`]): declare minimal coordinates.
     ///
     /// ```
     /// use std::f64::consts::TAU;
@@ -91,7 +92,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     /// The number of elements of a period, 40 by default; events cut some of them.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
-        self.elements = elements.max(1);
+        self.elements = elements;
         self
     }
 
@@ -157,6 +158,9 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         if const { !M::CONSTRAINTS.is_empty() } {
             return Err(OrbitError::HybridConstraints);
         }
+        if self.elements == 0 {
+            return Err(MeshError::NoElements.into());
+        }
         let mut period = self.period.checked()?;
         let is_free = matches!(self.period, Period::Guess(_));
         if is_free && M::FACTS.time_dependent {
@@ -200,8 +204,10 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
             });
             for _ in 0..=MAX_HALVINGS {
                 let moved = State {
-                    q: std::array::from_fn(|a| state.q[a] + part * change[N + a] * scales.q),
-                    p: std::array::from_fn(|a| state.p[a] + part * change[a] * scales.p),
+                    q: std::array::from_fn(|a| {
+                        state.q[a] + part * change[N + a] * scales.of(N + a)
+                    }),
+                    p: std::array::from_fn(|a| state.p[a] + part * change[a] * scales.of(a)),
                 };
                 let time = period + part * stretch;
                 if let Ok(run) = self.run(&moved, time)
@@ -278,8 +284,8 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         let nodes = run.motion().states();
         let (first, last) = (&nodes[0], run.motion().last());
         DVector::from_fn(2 * N, |row, _| match row.checked_sub(N) {
-            None => (last.p[row] - first.p[row]) / scales.p,
-            Some(a) => (last.q[a] - first.q[a] - self.advance[a]) / scales.q,
+            None => (last.p[row] - first.p[row]) / scales.of(row),
+            Some(a) => (last.q[a] - first.q[a] - self.advance[a]) / scales.of(row),
         })
     }
 
@@ -351,7 +357,7 @@ impl Closing<'_> {
         /// Singular values below this, of the largest, are zeros: of families of orbits.
         const ZERO: f64 = 1e-9;
         let size = residual.len();
-        let scale = |row: usize| self.scales.of(row, size);
+        let scale = |row: usize| self.scales.of(row);
         let columns = size + usize::from(self.rate.is_some());
         let matrix = DMatrix::from_fn(size, columns, |row, column| match &self.rate {
             Some(rate) if column == size => rate[row] * self.period / scale(row),
@@ -390,26 +396,42 @@ impl Closing<'_> {
 pub(super) struct Scales {
     pub(super) q: f64,
     pub(super) p: f64,
+    /// Of each, ordered (p, q).
+    own: Vec<f64>,
 }
 
 impl Scales {
-    /// That of a row of so many, ordered (p, q).
-    pub(super) fn of(&self, row: usize, size: usize) -> f64 {
-        if row < size / 2 { self.p } else { self.q }
+    /// That of a row, ordered (p, q).
+    pub(super) fn of(&self, row: usize) -> f64 {
+        self.own[row]
     }
 }
 
+/// All of a kind are measured by the largest of them, but those that are much smaller, as an angle beside a distance, by themselves. What is smaller still holds roundings of the largest, such as what is
+/// zero by symmetry.
 pub(super) fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
-    let largest = |of: fn(&State<N>) -> &[f64; N]| {
-        let states = motion.states().iter().map(crate::motion::Node::state);
-        let sizes = states.map(|state| of(&state).iter().fold(0.0_f64, |m, x| m.max(x.abs())));
-        let largest = sizes.fold(0.0, f64::max);
-        if largest > 0.0 { largest } else { 1.0 }
+    const SMALL: f64 = 1e-3;
+    const ROUNDINGS: f64 = 1e-12;
+
+    let mut own = Vec::with_capacity(2 * N);
+    let mut of_kind = |of: fn(&State<N>) -> &[f64; N]| {
+        let mut sizes = [0.0_f64; N];
+        for node in motion.states() {
+            for (size, value) in sizes.iter_mut().zip(of(&node.state())) {
+                *size = size.max(value.abs());
+            }
+        }
+        let largest = sizes.iter().fold(0.0_f64, |most, size| most.max(*size));
+        let largest = if largest > 0.0 { largest } else { 1.0 };
+        own.extend(sizes.iter().map(|size| {
+            let is_small = *size < SMALL * largest && *size > ROUNDINGS * largest;
+            if is_small { *size } else { largest }
+        }));
+        largest
     };
-    Scales {
-        q: largest(|state| &state.q),
-        p: largest(|state| &state.p),
-    }
+    let p = of_kind(|state| &state.p);
+    let q = of_kind(|state| &state.q);
+    Scales { q, p, own }
 }
 
 /// The first parameter that events have left with another value than a model has: with it the next period is another motion.

@@ -40,9 +40,9 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
             period,
         };
         let slopes = |by_end: DVector<f64>, parameter: Option<usize>| {
-            let residual = DVector::from_fn(2 * N, |row, _| by_end[row] / scales.of(row, 2 * N));
+            let residual = DVector::from_fn(2 * N, |row, _| by_end[row] / scales.of(row));
             let Correction { start, stretch, .. } = closing.shortest(&residual)?;
-            let change = |row: usize| start[row] * scales.of(row, 2 * N);
+            let change = |row: usize| start[row] * scales.of(row);
             let moved = State {
                 q: std::array::from_fn(|a| change(N + a)),
                 p: std::array::from_fn(change),

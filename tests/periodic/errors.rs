@@ -144,6 +144,11 @@ fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
                 .solve();
             assert_eq!(rest.err(), Some(OrbitError::AtRest), "{angle} {phase:?}");
         }
+        let nothing = PeriodicOrbit::of_simulation(&Simulation::new(&pendulum))
+            .unknown_period(6.0)
+            .elements(0)
+            .solve();
+        assert_eq!(nothing.err(), Some(OrbitError::Mesh(MeshError::NoElements)));
         let rest = PeriodicOrbit::of_simulation(&Simulation::new(&pendulum))
             .unknown_period(6.0)
             .guess_from(pendulum.state([angle], [0.0]))

@@ -53,6 +53,14 @@ struct Carried {
     m: f64,
 }
 
+/// Van der Pol's oscillator in something that is a long way off.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = dot(x)^2/2 + (dot(y)^2 - y^2)/2,
+    force(y) = (1 - y^2)*dot(y),
+)]
+struct FarVanDerPol {}
+
 /// Masses, lengths and times, one of them in other units.
 fn units() -> impl Iterator<Item = [f64; 3]> {
     let sizes = [1e-100, 1e-30, 1e-9, 1e-4, 1.0, 1e4, 1e9, 1e30, 1e100];
@@ -206,5 +214,22 @@ fn a_force_that_closes_an_orbit_is_measured_by_the_mass() {
         );
         let forced = of().period(7.5).solve();
         assert!(matches!(forced, Err(OrbitError::NoFamily { .. })), "{m:e}");
+    }
+}
+
+/// Orbits of simulations close in each coordinate, however far from zero another one is.
+#[test]
+fn small_coordinates_of_orbits_with_events_close_beside_large_ones() {
+    let oscillator = FarVanDerPol {};
+    let simulation = Simulation::new(&oscillator);
+    for far in [0.0, 1.0, 1e4, 1.5e11] {
+        let orbit = PeriodicOrbit::of_simulation(&simulation)
+            .unknown_period(6.6)
+            .guess_from(oscillator.state([far, 2.0], [0.0, 0.0]))
+            .solve()
+            .unwrap_or_else(|error| panic!("{far:e}: {error}"));
+        // As in `tests/reference/periodic.json`.
+        let period = orbit.period();
+        assert!((period - 6.663_286_859_3).abs() < 1e-6, "{far:e}: {period}");
     }
 }
