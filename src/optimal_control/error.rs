@@ -90,7 +90,8 @@ pub enum OptimalControlErrorKind {
         /// Iterations done.
         iterations: usize,
     },
-    /// No quadratic model of the problem has one minimum: an input costs nothing and moves nothing, or small changes of the inputs do not bring the motion to its ends.
+    /// No quadratic model of the problem has one minimum: an input costs nothing and moves nothing, the cost curves down along what is free of the start by more than inputs cost, or small changes of the
+    /// inputs do not bring the motion to its ends.
     Singular {
         /// Iterations done.
         iterations: usize,
@@ -209,7 +210,8 @@ impl fmt::Display for OptimalControlErrorKind {
                     _ => write!(f, "what {iterations} iterations have found")?,
                 }
                 f.write_str(
-                    ": an input costs nothing and moves nothing, or small changes of the inputs do not bring the motion to its ends; \
+                    ": an input costs nothing and moves nothing, the cost curves down along what is free of the start, \
+                     or small changes of the inputs do not bring the motion to its ends; \
                      another guess or another span may help",
                 )
             }
@@ -220,7 +222,7 @@ impl fmt::Display for OptimalControlErrorKind {
             } => write!(
                 f,
                 "no minimum after {iterations} iterations: the last correction is {correction:.1e} of the solution, {tolerance:.1e} was asked for; \
-                 a better guess or more elements may help"
+                 a better guess or more elements may help, or the cost falls without end"
             ),
             Self::NoMinimum {
                 element,
@@ -229,7 +231,7 @@ impl fmt::Display for OptimalControlErrorKind {
             } => write!(
                 f,
                 "no minimum after {iterations} iterations, but a stationary point from which the cost falls along small changes that begin in element {element}, at t = {time}; \
-                 begin with another guess of the inputs (`.guess_input(…)`), or see whether the cost falls without end"
+                 begin with another guess of the inputs (`.guess_input(…)`) or of the motion (`.guess(…)`), or see whether the cost falls without end"
             ),
         }
     }
