@@ -356,6 +356,7 @@ fn what_has_no_modes() {
         coordinate: 0,
     };
     check(&Gyroscopic { b: 0.2 }, &turning);
+    assert!(turning.to_string().contains("leave those out"));
     let (m, k, g) = (1.0, 1.0, 0.0);
     check(
         &Free {

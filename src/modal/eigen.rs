@@ -49,11 +49,15 @@ impl Quadratic {
         if !numbers.copied().all(f64::is_finite) {
             return Err(ModalError::NotFinite);
         }
-        if let Some(at) = zq.iter().position(|entry| *entry != 0.0) {
-            return Err(ModalError::VelocityCoupling {
-                velocity: at % zq.nrows(),
-                coordinate: at / zq.nrows(),
-            });
+        let gyroscopic = &zq - zq.transpose();
+        // Without those what is left is symmetric.
+        for entries in [&gyroscopic, &zq] {
+            if let Some(at) = entries.iter().position(|entry| *entry != 0.0) {
+                return Err(ModalError::VelocityCoupling {
+                    velocity: at % zq.nrows(),
+                    coordinate: at / zq.nrows(),
+                });
+            }
         }
         Ok(match form {
             Form::Lagrangian => Self {

@@ -16,9 +16,10 @@ pub enum ModalError {
     Forced,
     /// There are constraints.
     Constrained,
-    /// A velocity (or momentum) is multiplied by a coordinate.
+    /// A velocity (or momentum) is multiplied by a coordinate. Modes are complex where ∂²L/∂v∂q is not symmetric. A symmetric part is the time derivative ½ d(q·S q)/dt: in a Lagrangian it moves nothing
+    /// and can be left out.
     VelocityCoupling {
-        /// The velocity.
+        /// The velocity. Of the entries those are told first that have no equal counterpart.
         velocity: usize,
         /// The coordinate.
         coordinate: usize,
@@ -62,7 +63,8 @@ impl fmt::Display for ModalError {
                 coordinate,
             } => write!(
                 f,
-                "{WHO} velocity {velocity} is multiplied by coordinate {coordinate} in this one: its modes would be complex"
+                "{WHO} velocity {velocity} is multiplied by coordinate {coordinate} in this one: its modes would be complex, \
+                 unless such terms are the time derivative of a function of the coordinates; leave those out, they move nothing"
             ),
             Self::MassNotPositive => f.write_str(
                 "the kinetic energy must be positive for every velocity; is a mass zero?",
