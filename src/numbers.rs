@@ -18,7 +18,6 @@ impl fmt::Display for Short {
 }
 
 /// A number in a table with so many decimals, or with an exponent where these would say little.
-#[cfg(feature = "fit")]
 pub(crate) fn digits(number: f64, decimals: usize) -> String {
     if number == 0.0 || (1e-2..1e9).contains(&number.abs()) {
         format!("{number:.decimals$}")

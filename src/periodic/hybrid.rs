@@ -499,6 +499,7 @@ impl<const N: usize> HybridOrbit<N> {
     }
 
     /// The monodromy matrix, 2N × 2N, ordered (p, q): the derivative of the state after a period by that before, with what events do to both the state and its changes.
+    /// Its entries are infinite, or no numbers, where multipliers are beyond 10³⁰⁸.
     pub fn monodromy(&self) -> DMatrix<f64> {
         let identity = DMatrix::identity(2 * N, 2 * N);
         (self.transitions.iter()).fold(identity, |product, matrix| matrix * product)

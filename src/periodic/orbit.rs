@@ -7,7 +7,7 @@ use crate::assembly::{Assembly, Iterate, Solution};
 use crate::constraints::reduced;
 use crate::length::FixedLength;
 use crate::motion::{Motion, Node};
-use crate::numbers::larger;
+use crate::numbers::{digits, larger};
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
@@ -47,6 +47,9 @@ pub enum Verdict {
 impl Verdict {
     /// How near to one a modulus counts as one: multipliers of conservative models come in multiple ones, which round-off moves by
     /// its square root.
+    ///
+    /// A block of k equal multipliers with one direction is moved by the k-th root, by some 10⁻⁵ for k = 3 and 10⁻⁴ for k = 4, as where a symmetry or a resonance adds ones to the trivial pair: a verdict
+    /// with so small a margin decides nothing.
     pub const NEUTRAL: f64 = 1e-7;
 
     /// From all multipliers but the trivial ones, by their places. Without any, neighbours neither come nearer nor go away: an oscillator of one coordinate.
@@ -154,7 +157,8 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
 
     /// The monodromy matrix A_E ⋯ A_1, 2N × 2N, ordered (p, q): the derivative of the state after a period by that before.
     ///
-    /// Small multipliers of this matrix drown in the round-off of the large ones; [`multipliers`](Self::multipliers) do not come from it.
+    /// Small multipliers of this matrix drown in the round-off of the large ones, and beyond 10³⁰⁸ its entries are infinite or no numbers; [`multipliers`](Self::multipliers) do not come from it, and
+    /// [`floquet`](Self::floquet) tells those of any size.
     pub fn monodromy(&self) -> DMatrix<f64> {
         let start = self.start();
         let (_, p) = L::parts(&start);
@@ -260,8 +264,8 @@ impl<'m, M, const N: usize, L: Closed<M, N>> fmt::Display for Orbit<'m, M, N, L>
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "periodic orbit: T = {:.10}, {} elements, {} iterations",
-            self.period(),
+            "periodic orbit: T = {}, {} elements, {} iterations",
+            digits(self.period(), 10),
             self.solution.transitions().len(),
             self.statistics().newton_iterations
         )?;

@@ -93,6 +93,9 @@ fn conservative_orbits_have_the_same_period() {
             (period - TAU / 2.0_f64.sqrt()).abs() < 1e-6,
             "{m:e} {l:e} {t:e}: {period}"
         );
+        // With its digits, not with rows of zeros.
+        let shown = orbit.to_string().replace('.', "");
+        assert!(shown.contains("T = 4442"), "{orbit}");
         assert!(
             orbit.is_stable(),
             "{m:e} {l:e} {t:e} {:?} {:?}",
