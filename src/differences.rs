@@ -15,6 +15,13 @@ pub(crate) const WELL_KNOWN: f64 = 1e-9;
 /// The distances that are tried, in parts of the first.
 pub(crate) const NEARER: [f64; 3] = [1.0, 0.25, 0.0625];
 
+/// Whether nothing sees the size of a parameter, as of a drag of 1e-20: all of it moves something of some size by so little that parts of it change that by roundings.
+pub(crate) fn is_next_to_zero(parameter: f64, (moved, size): (f64, f64)) -> bool {
+    const SEEN: f64 = 1e-4;
+
+    parameter != 0.0 && moved <= SEEN * size
+}
+
 /// Weights of values at ±1 and ±2 distances: of fourth order.
 const FOURTH: [f64; 2] = [8.0 / 12.0, -1.0 / 12.0];
 

@@ -1,6 +1,6 @@
 //! How multipliers move with a parameter (T-157).
 
-use crate::differences::{NEARER, PART, WELL_KNOWN, places};
+use crate::differences::{NEARER, PART, WELL_KNOWN, is_next_to_zero, places};
 use crate::numbers::larger;
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
@@ -21,11 +21,9 @@ pub(super) fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 
 
 /// The distances that are tried: that by a parameter, after that by one that is zero where nothing sees the size of the parameter, in parts of which multipliers change by roundings.
 pub(super) fn distances(value: f64, parts: [f64; 3]) -> Vec<f64> {
-    const SEEN: f64 = 1e-4;
-
     let own = distance(value, parts);
     let largest = parts.into_iter().fold(0.0, f64::max);
-    match value != 0.0 && largest * value.abs() <= SEEN {
+    match is_next_to_zero(value, (largest * value.abs(), 1.0)) {
         true => vec![distance(0.0, parts), own],
         false => vec![own],
     }

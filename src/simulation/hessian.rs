@@ -1,7 +1,7 @@
 //! Second derivatives of losses: differences of gradients, each of which is exact (T-158).
 
 use super::setup::Simulation;
-use crate::differences::{NEARER, PART, WELL_KNOWN, places};
+use crate::differences::{NEARER, PART, WELL_KNOWN, is_next_to_zero, places};
 use crate::error::{RunError, RunErrorKind};
 use crate::length::{Length, RunTimeLength};
 use crate::sensitivity::{Loss, LossGradient, LossHessian};
@@ -182,12 +182,11 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
         part_of((self.found.0 / self.slope(index)).abs())
     }
 
-    /// Whether the loss does not see the size of a parameter, as of a drag of 1e-20: in parts of it the gradient changes by roundings.
+    /// Whether the loss does not see the size of a parameter.
     fn is_next_to_zero(&self, index: usize) -> bool {
-        const SEEN: f64 = 1e-4;
-
         let value = self.values[index];
-        value != 0.0 && (value * self.slope(index)).abs() <= SEEN * self.found.0.abs()
+        let moved = (value * self.slope(index)).abs();
+        is_next_to_zero(value, (moved, self.found.0.abs()))
     }
 
     fn slope(&self, index: usize) -> f64 {
