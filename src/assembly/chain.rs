@@ -203,9 +203,17 @@ impl Chain {
         let shape = self.shape;
         let m = shape.block;
         self.sign = 0.0;
-        let swept = self.sweep.eliminate(&shape, &self.equations);
+        let mut swept = self.sweep.eliminate(&shape, &self.equations);
         self.closing.load(&shape, &self.equations, &self.sweep);
-        let closed = self.closing.solve()?;
+        let mut closed = self.closing.solve();
+        if let Err(Singular::Rank { .. }) = closed
+            && let Some(again) = self.sweep.eliminate_again(&shape, &self.equations)
+        {
+            swept = again;
+            self.closing.load(&shape, &self.equations, &self.sweep);
+            closed = self.closing.solve();
+        }
+        let closed = closed?;
         for side in 0..shape.rights {
             let nodes = &mut self.nodes[side * shape.nodes()..(side + 1) * shape.nodes()];
             let globals = &mut self.globals[side * shape.globals..(side + 1) * shape.globals];

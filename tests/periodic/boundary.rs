@@ -259,3 +259,20 @@ fn conjugate_points_have_no_motion_between_them() {
     let off = arc.start().p[0] * end.sin() - 1.0;
     assert!(off.abs() < 3e-7, "{off:e}");
 }
+
+/// In a short time momenta hardly move a body, as those of a heavy one do: they are as large as that is small.
+#[test]
+fn a_projectile_in_a_short_time() {
+    let projectile = Projectile { g: 9.81 };
+    for time in [1e-12, 1e-16, 1e-30] {
+        let arc = BoundaryValue::of(&projectile)
+            .elements(7)
+            .from_to([0.0, 1.0], [10.0, 3.0], 0.0..time)
+            .solve()
+            .unwrap_or_else(|error| panic!("{time:e}: {error}"));
+        let State { p: [vx, vy], .. } = arc.start();
+        // Beside them weight is nothing.
+        assert!((vx * time / 10.0 - 1.0).abs() < 1e-13, "{time:e}: {vx:e}");
+        assert!((vy * time / 2.0 - 1.0).abs() < 1e-13, "{time:e}: {vy:e}");
+    }
+}

@@ -1,7 +1,7 @@
 //! The elimination of the interior nodes and the back substitution.
 
 use super::equations::{Equations, Shape};
-use crate::periodic_schur::{balancing, power_of_two, reflection};
+use crate::periodic_schur::{balancing, exponent, power_of_two, reflection};
 
 /// The rows of the elimination; nodes are scaled, ŷ = D⁻¹ y.
 ///
@@ -51,8 +51,18 @@ impl Sweep {
     ///
     /// What is left is read by [`relation`](Self::relation) and [`dense`](Self::dense).
     pub(super) fn eliminate(&mut self, shape: &Shape, equations: &Equations) -> f64 {
-        let m = shape.block;
         self.balance(equations);
+        self.eliminate_scaled(shape, equations)
+    }
+
+    /// The same once more where what was left is singular, in other scales; none where there are no others.
+    pub(super) fn eliminate_again(&mut self, shape: &Shape, equations: &Equations) -> Option<f64> {
+        let is_raised = self.raise();
+        is_raised.then(|| self.eliminate_scaled(shape, equations))
+    }
+
+    fn eliminate_scaled(&mut self, shape: &Shape, equations: &Equations) -> f64 {
+        let m = shape.block;
         self.start(shape, equations);
         let mut flips = 0;
         for e in 1..shape.links {
@@ -113,6 +123,28 @@ impl Sweep {
             // These are exponents for the transpose. The bound keeps D and D⁻¹ normal numbers.
             *scale = power_of_two(-exponent.clamp(-500, 500));
         }
+    }
+
+    /// Raises the scales of components that hardly move others, and are moved even less, as momenta of bodies that nothing holds over a short time: what they move is then as large as they are. Whether
+    /// there are any.
+    fn raise(&mut self) -> bool {
+        /// Equations in the scales so far lose less.
+        const HARDLY: f64 = 1e-10;
+
+        let m = self.scales.len();
+        let mut is_raised = false;
+        for j in 0..m {
+            let others = || (0..m).filter(|i| *i != j);
+            let moves = others().map(|i| self.most[i * m + j]);
+            let moves = moves.fold(0.0_f64, f64::max);
+            let moved = others().map(|i| self.most[j * m + i]);
+            let moved = moved.fold(0.0_f64, f64::max);
+            if moves > 0.0 && moves < HARDLY && moved < moves {
+                self.scales[j] *= power_of_two((-exponent(moves)).min(400));
+                is_raised = true;
+            }
+        }
+        is_raised
     }
 
     /// Makes the first link the relation, and begins the dense rows.
