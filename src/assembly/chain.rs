@@ -257,7 +257,7 @@ impl Chain {
     }
 
     /// How near the equations are to singular ones, after a successful [`solve`](Self::solve): the smallest pivot of those that are left for the ends and the global unknowns, beside the largest.
-    pub(crate) fn smallest_pivot(&self) -> f64 {
+    pub(super) fn smallest_pivot(&self) -> f64 {
         self.closing.smallest()
     }
 

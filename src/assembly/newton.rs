@@ -371,9 +371,9 @@ impl<const N: usize> Assembly<N> {
         })
     }
 
-    /// How near the last system is to a singular one.
-    pub(super) fn smallest_pivot(&self) -> f64 {
-        self.chain.smallest_pivot()
+    /// The last system.
+    pub(super) fn chain(&self) -> &Chain {
+        &self.chain
     }
 
     /// The correction beside the iterate.

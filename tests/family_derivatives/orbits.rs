@@ -4,6 +4,7 @@ use crate::differences::difference;
 use crate::largest::larger;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
+use tfe::AssemblyError;
 use tfe::family::FamilyState;
 use tfe::length::RunTimeLength;
 use tfe::periodic::{OrbitError, OrbitSlopes, Phase, Verdict};
@@ -38,6 +39,32 @@ struct DrivenSix {
     c: f64,
     f: f64,
     omega: f64,
+}
+
+/// Two masses have the frequencies 1 and √3. Without damping there is no orbit at the first: elements are off by 4e-6 (ten) to 9e-10 (forty) of it, and have one as large as that is small.
+#[test]
+fn resonance_without_damping_has_no_orbit() {
+    let driven = Driven {
+        n: 2,
+        b: 0.0,
+        c: 0.0,
+        f: 0.3,
+        omega: 1.0,
+    };
+    for elements in [10, 40] {
+        let error = PeriodicOrbit::of(&driven)
+            .elements(elements)
+            .period(TAU)
+            .solve();
+        assert!(
+            matches!(
+                error,
+                Err(OrbitError::Assembly(AssemblyError::Singular { .. }))
+            ),
+            "{elements}: {:?}",
+            error.map(|orbit| orbit.start())
+        );
+    }
 }
 
 /// The same without force: conservative.

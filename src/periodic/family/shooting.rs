@@ -1,6 +1,7 @@
 //! Multiple shooting: the nodes of all elements as unknowns, each element solved by itself.
 
 use super::super::error::OrbitError;
+use super::super::kind::Chained;
 use super::super::orbit::sort;
 use super::super::phase::Phase;
 use super::super::problem::{Global, NEIGHBOURED, check, inertia_of};
@@ -130,9 +131,11 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         loop {
             if convergence.is_done() {
                 self.correct(&chain, 1.0);
-                return self.check();
+                self.check()?;
+                return self.check_resolved(&chain);
             }
-            convergence.go_on().map_err(OrbitError::Assembly)?;
+            let goes_on = convergence.go_on();
+            goes_on.map_err(|error| self.explained(error, &chain))?;
             let before = (self.nodes.clone(), self.period, self.unfolding);
             self.correct(&chain, convergence.fraction());
             let tried = self.linearise(&mut chain);
@@ -142,11 +145,53 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             }
             if let Err(stalled) = convergence.halve() {
                 tried?;
-                return Err(OrbitError::Assembly(stalled));
+                return Err(self.explained(stalled, &chain));
             }
             (self.nodes, self.period, self.unfolding) = before;
             self.linearise(&mut chain)?;
         }
+    }
+
+    /// Whether time forces orbits.
+    fn is_forced() -> bool {
+        M::FACTS.time_dependent || M::MOMENTA_MOVE
+    }
+
+    /// Why there is no orbit: a forced one at resonance is told.
+    fn explained(&self, error: AssemblyError, chain: &Chain) -> OrbitError {
+        match Self::is_forced() {
+            true => chain.explained(error).into(),
+            false => error.into(),
+        }
+    }
+
+    /// Refuses a forced orbit that elements of half the length do not leave as it is, as for orbits of fixed size.
+    fn check_resolved(&self, chain: &Chain) -> Result<(), OrbitError> {
+        if !(Self::is_forced() && chain.is_doubtful()) {
+            return Ok(());
+        }
+        let (mesh, motion) = (self.mesh.halved(), self.motion());
+        let last = motion.last().t;
+        let inside = mesh.times(self.start, self.period).enumerate();
+        let nodes = inside.map(|(k, t)| match (k % 2, motion.at(t.min(last))) {
+            (1, Ok(node)) => node.state(),
+            _ => self.nodes[k / 2].clone(),
+        });
+        let nodes: Vec<FamilyState> = nodes.collect();
+        let span = (self.start, self.period);
+        let mut halves = Self::new(self.model, self.element, mesh, span, nodes);
+        let mut other = Chain::new(2 * self.model.len(), 0, halves.mesh.elements(), 0);
+        let is_left = match halves.linearise(&mut other) {
+            Ok(()) => halves.size(&other).leaves(),
+            Err(OrbitError::Assembly(AssemblyError::Singular { .. })) => false,
+            // What it cannot tell it does not refuse.
+            Err(_) => true,
+        };
+        if is_left {
+            return Ok(());
+        }
+        let iterations = self.iterations();
+        Err(AssemblyError::Singular { iterations }.into())
     }
 
     /// Whether a solution is an orbit.
