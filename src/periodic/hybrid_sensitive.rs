@@ -75,7 +75,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
     /// What a unit of the period does to the end, ordered (p, q), where all elements become longer: a difference of eighth order.
     fn by_length(&self, start: State<N>, period: f64) -> Result<DVector<f64>, OrbitError> {
         let mut sum = DVector::zeros(2 * N);
-        for place in places(moving::distance(period, [])) {
+        for place in places(moving::distance_of_period(period, self.elements)) {
             let run = self.run(&start, period + place.shift)?;
             let last = run.motion().last();
             let end = last.p.iter().chain(&last.q).copied();

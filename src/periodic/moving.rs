@@ -10,13 +10,18 @@ use std::f64::consts::PI;
 const KNOWN: f64 = 1e-7;
 
 /// The distance of differences by a parameter of this value, where unit steps of it move things by such parts of their sizes.
-pub(super) fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 {
+fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 {
     let of_itself = if value == 0.0 { 0.0 } else { 1.0 / value.abs() };
     let largest = parts.into_iter().fold(of_itself, f64::max);
     match largest > 0.0 && largest.is_finite() {
         true => PART / largest,
         false => PART,
     }
+}
+
+/// The distance of differences by a period that so many elements make up: ends move by a small part of an element, however often the motion goes to and fro in a period.
+pub(super) fn distance_of_period(period: f64, elements: usize) -> f64 {
+    distance(period, [elements as f64 / period])
 }
 
 /// The distances that are tried: that by a parameter, after that by one that is zero where nothing sees the size of the parameter, in parts of which multipliers change by roundings.

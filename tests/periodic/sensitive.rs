@@ -513,3 +513,28 @@ fn a_clock_by_all_parameters() {
         close(found[3], expected[3], 1e-8);
     }
 }
+
+/// An orbit of forty periods of the force has forgotten its start at its end: how its start changes with the period is how fast it moves there, at ẍ = f cos 0 − δ ẋ − x.
+#[test]
+fn a_period_of_many_turns_changes_the_start_as_one_does() {
+    let model = Duffing {
+        alpha: 1.0,
+        beta: 0.0,
+        delta: 0.2,
+        f: 0.3,
+        omega: 1.4,
+    };
+    let simulation = Simulation::new(&model).element(Mixed::<6>);
+    let s = PeriodicOrbit::of_simulation(&simulation)
+        .elements(320)
+        .period(40.0 * TAU / model.omega)
+        .guess_from(model.state([-0.288], [0.1176]))
+        .solve_sensitive()
+        .expect("an orbit");
+    let start = s.orbit().start();
+    let by_period = s.by_period().expect("it is given").start();
+    // Less what is left of the start, e^{−0.1 T} = 2e-8.
+    close(by_period.q[0], start.p[0], 1e-6);
+    let rate = 0.3 - 0.2 * start.p[0] - start.q[0];
+    close(by_period.p[0], rate, 1e-6);
+}

@@ -131,7 +131,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
     fn ends_by_period(&self) -> Result<Vec<f64>, OrbitError> {
         let size = 2 * self.model.len();
         let mut sums = vec![0.0; size * self.mesh.elements()];
-        let distance = moving::distance(self.period, []);
+        let distance = moving::distance_of_period(self.period, self.mesh.elements());
         for place in places(distance) {
             let places = self.places(self.period + place.shift);
             let mut rows = sums.chunks_exact_mut(size);
