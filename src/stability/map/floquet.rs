@@ -20,7 +20,7 @@ impl MapPlan {
     /// ```
     ///
     /// A model without a period has any: ρ is then e^{σT}, σ the largest growth rate. Rest must be a motion of the model; where a force moves it, the point fails with
-    /// [`FloquetError::NotAtRest`].
+    /// [`FloquetError::NotAtRest`]. Where Φ has an entry beyond 10³⁰⁸ the point fails with [`FloquetError::Eigenvalues`].
     ///
     /// # Errors
     /// [`MapError::Element`], [`MapError::Period`] and those of [`MapPlan::run`].
