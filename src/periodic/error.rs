@@ -17,6 +17,13 @@ pub enum OrbitError {
         /// Its value.
         period: f64,
     },
+    /// A number that was given is infinite, or none.
+    Number {
+        /// What it is.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
     /// The model depends on time: the period of its orbits is that of the forcing (or a multiple), not an unknown.
     ForcedPeriod,
     /// The mesh makes no sense.
@@ -101,6 +108,7 @@ impl fmt::Display for OrbitError {
                 f.write_str("no period: give `.period(T)`, or `.unknown_period(guess)` for an autonomous model")
             }
             Self::Period { period } => write!(f, "the period is {period}, it must be positive"),
+            Self::Number { what, value } => write!(f, "the {what} is {value}, it must be finite"),
             Self::ForcedPeriod => f.write_str(
                 "the model depends on time, so its orbits have the period of the forcing: give it with `.period(T)`",
             ),

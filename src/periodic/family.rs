@@ -29,6 +29,7 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
     /// The equations and their solution.
     fn solved(&self) -> Result<Shooting<'m, M>, OrbitError> {
         let period = self.period.checked()?;
+        self.check_numbers()?;
         if self.advance.is_some() {
             return Err(OrbitError::Unsupported {
                 call: "advance",

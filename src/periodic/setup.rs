@@ -204,6 +204,23 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         self
     }
 
+    /// Refuses numbers of which no equations can be made.
+    pub(super) fn check_numbers(&self) -> Result<(), OrbitError> {
+        let phase = match self.phase {
+            Phase::Coordinate { value, .. } | Phase::Momentum { value, .. } => value,
+            Phase::Orthogonal => 0.0,
+        };
+        let given = [
+            ("time of the start", self.start),
+            ("energy", self.energy.unwrap_or(0.0)),
+            ("value of the condition of phase", phase),
+        ];
+        let wrong = given.into_iter().find(|(_, value)| !value.is_finite());
+        wrong.map_or(Ok(()), |(what, value)| {
+            Err(OrbitError::Number { what, value })
+        })
+    }
+
     /// Refuses an energy where something else decides on it.
     pub(super) fn check_energy(&self, conservative: bool) -> Result<(), OrbitError> {
         let of = match (self.energy, self.period) {
@@ -241,6 +258,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// The equations and their solution.
     pub(crate) fn solved(&self) -> Result<Solved<'m, M, N>, OrbitError> {
         let period = self.period.checked()?;
+        self.check_numbers()?;
         let autonomous = !M::FACTS.time_dependent;
         let conservative = autonomous && !M::FACTS.forced;
         let mut problem = Periodic {

@@ -28,6 +28,17 @@ fn orbits_that_are_ill_posed() {
     }
     let error = PeriodicOrbit::of(&forced).unknown_period(4.0).solve();
     assert!(matches!(error, Err(OrbitError::ForcedPeriod)));
+    for value in [f64::NAN, f64::INFINITY] {
+        let of_phase = Phase::Coordinate { index: 0, value };
+        for wrong in [
+            problem().start_time(value),
+            problem().energy(value),
+            problem().phase(of_phase),
+        ] {
+            let error = wrong.unknown_period(6.0).solve();
+            assert!(matches!(error, Err(OrbitError::Number { .. })));
+        }
+    }
     let error = problem().unknown_period(6.0).elements(0).solve();
     assert!(matches!(
         error,
