@@ -14,6 +14,7 @@ mod impulses;
 mod inputs;
 mod kind;
 mod linearise;
+mod masses;
 pub(crate) mod mesh;
 mod pieces;
 mod progress;

@@ -29,13 +29,14 @@ pub enum Warning {
     },
     /// The mass matrix ∂²L/∂v² at the start has eigenvalues of both signs: forces speed up where they should slow down, mostly for a wrong sign in the Lagrangian.
     ///
-    /// Looked for at the start of a run, for Lagrangians without constraints.
+    /// Looked for at the start of a run, for Lagrangians without constraints, with the unit of each coordinate such that its own mass is one. Of models of run-time length with more than 64 coordinates
+    /// that are coupled by their masses, every coordinate and every two that are coupled are looked at.
     MassIndefinite {
         /// The start.
         time: f64,
-        /// The least eigenvalue.
+        /// The least eigenvalue; where it is small beside roundings of the largest one, or of parts of the matrix, a number v·Mv/v·v below zero.
         least: f64,
-        /// The largest one.
+        /// The largest one, or such a number above zero.
         largest: f64,
     },
     /// The energy at a node is not finite: the momentum belongs to no velocity there (the mass matrix is singular), or the model has a singular point.

@@ -4,8 +4,7 @@ use crate::evaluate::Evaluate;
 use crate::length::Length;
 use crate::motion::{Motion, Node, Warning};
 use crate::stability::linear_model::LinearModel;
-use nalgebra::DMatrix;
-use tfe_runtime::{Element, First, Form, Model, State};
+use tfe_runtime::{Element, Model, State};
 
 /// Looks at the elements of a run now and then.
 #[derive(Clone, Debug)]
@@ -162,38 +161,6 @@ pub(crate) fn is_jump([before, after]: [f64; 2], kinetic: f64, more: &dyn Fn() -
     let rounding = 1e-9 * after.abs().max(before.abs());
     let jump = (after - before).abs();
     jump > (0.1 * kinetic).max(rounding) && jump > 2.0 * more()
-}
-
-/// What is wrong with the mass matrix at the start of a run.
-pub(super) fn mass_signs<M: Model<N>, const N: usize>(
-    model: &M,
-    start: &Node<N>,
-) -> Option<Warning> {
-    let has_mass = const { matches!(M::FORM, Form::Lagrangian) && M::CONSTRAINTS.is_empty() };
-    if !has_mass {
-        return None;
-    }
-    let (mut first, mut mass) = (First::ZERO, [[0.0; N]; N]);
-    model.first_and_mass(start.t, &start.q, &start.v, &mut first, &mut mass);
-    let (least, largest) = signs(mass.as_flattened())?;
-    Some(Warning::MassIndefinite {
-        time: start.t,
-        least,
-        largest,
-    })
-}
-
-/// The least and the largest eigenvalue of a symmetric matrix, if they are of different signs beyond roundings.
-fn signs(matrix: &[f64]) -> Option<(f64, f64)> {
-    const ROUNDING: f64 = 1e-9;
-    if !matrix.iter().all(|entry| entry.is_finite()) {
-        return None;
-    }
-    let size = matrix.len().isqrt();
-    let eigenvalues = DMatrix::from_row_slice(size, size, matrix).symmetric_eigenvalues();
-    let (least, largest) = (eigenvalues.min(), eigenvalues.max());
-    let size = least.abs().max(largest.abs());
-    (least < -ROUNDING * size && largest > ROUNDING * size).then_some((least, largest))
 }
 
 /// What the energy of the nodes has been.

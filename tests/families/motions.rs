@@ -309,6 +309,31 @@ fn forces_by_site_and_a_coordinate_of_its_own() {
     }
 }
 
+/// A mass of the wrong sign, beside one that is much larger.
+#[test]
+fn masses_of_both_signs_are_told() {
+    for (mass, is_told) in [(-2.0, true), (2.0, false)] {
+        let model = Driven {
+            n: 3,
+            m: vec![1e9, mass, 0.5],
+            c: vec![0.0; 3],
+            k: 0.7,
+            f: 0.4,
+        };
+        let start = model.state([0.3, 0.1, -0.4, 0.2], [0.0, 0.5, -0.1, 0.3]);
+        let simulation = Simulation::new(&model).step(0.01);
+        let warning = Warning::MassIndefinite {
+            time: 0.0,
+            least: -2.0,
+            largest: 1e9,
+        };
+        let expected: Vec<Warning> = is_told.then_some(warning).into_iter().collect();
+        let motion = simulation.run(start.clone(), 0.0..0.1).expect("a run");
+        assert_eq!(motion.warnings(), expected);
+        assert_eq!(simulation.steps(start, 0.0).warnings(), expected);
+    }
+}
+
 /// The endless sequence is the same motion, and so is a run that goes through a break.
 #[test]
 fn steps_are_those_of_a_run() {

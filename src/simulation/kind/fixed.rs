@@ -1,8 +1,9 @@
 //! Models of fixed size.
 
 use super::super::checks::{check_constraints, check_impulse, check_start, conserves_energy};
+use super::super::masses::mass_signs;
 use super::super::mesh::{Grid, Mesh, within};
-use super::super::watch::{Watch, mass_signs};
+use super::super::watch::Watch;
 use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
 use crate::evaluate::names;

@@ -2,6 +2,7 @@
 
 use super::super::acting;
 use super::super::checks::{check_finite, check_impulse, conserves_energies};
+use super::super::masses::mass_signs_by_entries;
 use super::super::mesh::{Grid, Mesh};
 use super::super::watch::Watch;
 use super::{Chosen, Simulated, second};
@@ -259,8 +260,8 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
 
     fn look(&self, _: &mut Watch, _: usize, _: (f64, f64), _: &FamilyState, _: bool) {}
 
-    fn weigh(&self, _: &Node<0, RunTimeLength>) -> Option<Warning> {
-        None
+    fn weigh(&self, start: &Node<0, RunTimeLength>) -> Option<Warning> {
+        mass_signs_by_entries(self, start)
     }
 
     fn outputs_along(&self, piece: &family::DenseElement, values: &mut [Enclosure]) {
