@@ -184,6 +184,7 @@ fn indices_of_constraints_are_checked() {
     // Lengths that no memory holds are refused before anything is counted.
     for n in [1 << 60, usize::MAX] {
         assert!(Ties { n, w: 3 }.check().is_err());
+        assert!(Ties { n, w: n }.check().is_err());
     }
 }
 

@@ -105,6 +105,23 @@ fn lengths_are_checked_before_anything_else() {
     );
 }
 
+/// Neither do sums of lengths overflow, nor is anything counted up to them.
+#[test]
+fn lengths_of_no_array_are_errors() {
+    let mut message = String::new();
+    for length in [1 << 60, 1 << 63, usize::MAX] {
+        let expected = family::ModelError::Length { field: "n", length };
+        message = expected.to_string();
+        assert_eq!(coupled(length, 3, 3, 2).check(), Err(expected));
+        let expected = family::ModelError::Length { field: "w", length };
+        assert_eq!(coupled(3, length, 3, 2).check(), Err(expected));
+    }
+    assert_eq!(
+        message,
+        "`n` is 18446744073709551615, but no array has so many elements"
+    );
+}
+
 /// An index outside of any sum is named without one.
 #[test]
 fn a_single_index_is_checked_too() {

@@ -306,11 +306,16 @@ fn starts_and_models_that_do_not_fit_are_errors() {
     };
     assert_eq!(error(&toda, &[0.0; 4], &[0.0; 5]), length("q", 4, 5));
     assert_eq!(error(&toda, &[0.0; 5], &[0.0; 6]), length("p", 6, 5));
-    let absurd = Toda { n: 1 << 60 };
+    // Lengths that no memory holds are refused before any is asked for.
+    let absurd = Toda { n: 1 << 40 };
     assert_eq!(
         error(&absurd, &[0.0; 2], &[0.0; 2]),
-        length("q", 2, 1 << 60)
+        length("q", 2, 1 << 40)
     );
+    assert!(matches!(
+        error(&Toda { n: 1 << 60 }, &[0.0; 2], &[0.0; 2]),
+        RunErrorKind::Family(family::ModelError::Length { field: "n", .. })
+    ));
     assert!(matches!(
         error(&Toda { n: 1 }, &[0.0], &[0.0]),
         RunErrorKind::Family(family::ModelError::EmptyRange { .. })

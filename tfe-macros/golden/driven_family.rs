@@ -48,6 +48,7 @@ const _: () = {
             self.n
         }
         fn check(&self) -> ::core::result::Result<(), __tfe::FamilyError> {
+            __tfe::checks::length("n", self.n)?;
             __tfe::checks::elements("q[n]", self.n)?;
             __tfe::checks::turns("i in 0..n", 0, (self.n as i64))?;
             __tfe::checks::turns("i in 0..n-1", 0, (self.n as i64) - 1)?;

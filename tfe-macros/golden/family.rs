@@ -52,6 +52,8 @@ const _: () = {
             1usize.saturating_add(self.n)
         }
         fn check(&self) -> ::core::result::Result<(), __tfe::FamilyError> {
+            __tfe::checks::length("n", self.n)?;
+            __tfe::checks::length("w", self.w)?;
             __tfe::checks::elements("q[n]", self.n)?;
             __tfe::checks::field_length(
                 "m",

@@ -19,7 +19,7 @@ use quote::quote;
 use strides::Strides;
 use syn::ItemStruct;
 use tfe_symbolic::derive::derivation::Derivation;
-use tfe_symbolic::expr::input::Affine;
+use tfe_symbolic::expr::input::{Affine, IndexSymbol};
 use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Declared, Extent, Form, Requirement};
 use tfe_symbolic::program::{Program, Request};
@@ -382,8 +382,52 @@ impl Kernels<'_> {
         }
     }
 
+    /// The fields that lengths, ranges and indices are made of, each once.
+    fn length_fields(&self) -> Vec<&str> {
+        let mut affines: Vec<&Affine> = Vec::new();
+        let coordinates = self.declared.coordinates.iter();
+        affines.extend(coordinates.filter_map(|array| array.length.as_ref()));
+        for requirement in &self.declared.requirements {
+            match requirement {
+                Requirement::FieldLength { length, .. } => affines.push(length),
+                Requirement::Turns { start, end, .. } => affines.extend([start, end]),
+                Requirement::Index {
+                    nest,
+                    place,
+                    length,
+                    ..
+                } => {
+                    affines.extend(nest.iter().flat_map(|range| [&range.start, &range.end]));
+                    affines.push(place);
+                    if let Extent::Known(length) = length {
+                        affines.push(length);
+                    }
+                }
+            }
+        }
+        let mut fields: Vec<&str> = Vec::new();
+        while let Some(affine) = affines.pop() {
+            for (symbol, _) in &affine.terms {
+                match symbol {
+                    IndexSymbol::Field(name) if !fields.contains(&name.as_str()) => {
+                        fields.push(name);
+                    }
+                    IndexSymbol::Entry(_, place) => affines.push(place),
+                    _ => {}
+                }
+            }
+        }
+        fields.sort_unstable();
+        fields
+    }
+
     /// The statements of `check`.
     fn check(&self) -> TokenStream {
+        // First of all, so that what follows does not overflow.
+        let longest = self.length_fields().into_iter().map(|name| {
+            let field = indices::identifier(name);
+            quote!(__tfe::checks::length(#name, self.#field)?;)
+        });
         let elements = self.declared.coordinates.iter().filter_map(|array| {
             let length = array
                 .length
@@ -452,7 +496,7 @@ impl Kernels<'_> {
             let field = indices::identifier(name);
             quote!(__tfe::checks::field_length(#name, self.#field.len(), &[#(#uses),*])?;)
         });
-        quote!(#(#elements)* #(#lengths)* #(#rest)*)
+        quote!(#(#longest)* #(#elements)* #(#lengths)* #(#rest)*)
     }
 
     fn coordinate_name(&self) -> TokenStream {

@@ -257,6 +257,20 @@ pub fn observables<M: Model>(
 pub mod checks {
     use super::ModelError;
 
+    /// Longer than any array: sums of some such lengths do not overflow.
+    const LONGEST: i64 = 1 << 40;
+
+    /// A length is one that an array may have.
+    ///
+    /// # Errors
+    /// [`ModelError::Length`].
+    pub fn length(field: &'static str, length: usize) -> Result<(), ModelError> {
+        if i64::try_from(length).is_ok_and(|length| length <= LONGEST) {
+            return Ok(());
+        }
+        Err(ModelError::Length { field, length })
+    }
+
     /// A coordinate array has elements.
     ///
     /// # Errors
@@ -327,7 +341,6 @@ pub mod checks {
     /// An entry of a list as a summand: larger ones than any array is long count as that.
     #[must_use]
     pub fn small(entry: usize) -> i64 {
-        const LONGEST: i64 = 1 << 40;
         i64::try_from(entry).map_or(LONGEST, |entry| entry.min(LONGEST))
     }
 

@@ -12,6 +12,13 @@ pub enum ModelError {
         /// The array as declared, `q[n]`.
         array: &'static str,
     },
+    /// A length beyond 2⁴⁰, of which no array has so many elements.
+    Length {
+        /// The field.
+        field: &'static str,
+        /// Its value.
+        length: usize,
+    },
     /// A sum over nothing, or a constraint or an output of no site.
     EmptyRange {
         /// The range of the sum, `i in 0..n-1`; of a constraint or an output, the declaration, `constraint(rod[i in 0..n-1])`.
@@ -118,6 +125,9 @@ impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoElements { array } => write!(f, "the array `{array}` has no elements"),
+            Self::Length { field, length } => {
+                write!(f, "`{field}` is {length}, but no array has so many elements")
+            }
             Self::EmptyRange { ranges, start, end } => {
                 let sum = sum_over(ranges);
                 write!(f, "{sum}`{ranges}` is empty: its range is {start}..{end}")
