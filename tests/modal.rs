@@ -168,7 +168,7 @@ fn fewer_modes_keep_their_part_of_the_motion() {
     let row = row(30, 0.2);
     let modal: Modal<'_, Row, 2> = Modal::of(&row).unwrap();
     // A row that hangs at rest is none of its modes.
-    let hanging = row.state(modal.equilibrium().to_vec(), vec![0.0; 30]);
+    let hanging = row.state(modal.equilibrium(), vec![0.0; 30]);
     let rest = modal.reduce(&hanging);
     assert!(rest.q.iter().chain(&rest.p).all(|x| x.abs() < 1e-14));
     // m g / k (j (n + 1 − j)) / 2 is what masses between two walls give way.

@@ -309,6 +309,25 @@ fn forces_by_site_and_a_coordinate_of_its_own() {
     }
 }
 
+#[test]
+fn states_are_made_of_arrays_slices_and_vectors() {
+    let chain = Chain {
+        n: 5,
+        m: 2.0,
+        k: 1.0,
+        a: 0.2,
+    };
+    let (q, v) = (START.to_vec(), PUSH.to_vec());
+    let expected = FamilyState {
+        q: q.clone(),
+        p: v.iter().map(|v| 2.0 * v).collect(),
+    };
+    assert_eq!(chain.state(START, PUSH), expected);
+    assert_eq!(chain.state(&q, &v), expected);
+    assert_eq!(chain.state(&q[..], &v[..]), expected);
+    assert_eq!(chain.state(q, v), expected);
+}
+
 /// A mass of the wrong sign, beside one that is much larger.
 #[test]
 fn masses_of_both_signs_are_told() {

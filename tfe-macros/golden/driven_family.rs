@@ -329,10 +329,10 @@ impl Chain {
     /// Vectors of another length than the model's, and lengths of the model that do not fit together, are errors of the run.
     fn state(
         &self,
-        q: impl ::core::convert::Into<::tfe::__private::List>,
-        v: impl ::core::convert::Into<::tfe::__private::List>,
+        q: impl ::core::convert::AsRef<[::core::primitive::f64]>,
+        v: impl ::core::convert::AsRef<[::core::primitive::f64]>,
     ) -> ::tfe::__private::FamilyState {
-        ::tfe::__private::family_state(self, 0.0, q.into(), v.into())
+        ::tfe::__private::family_state(self, 0.0, q, v)
     }
     /// What was derived from the declaration: a page when printed.
     fn structure() -> ::tfe::__private::Structure {

@@ -555,10 +555,10 @@ impl Kernels<'_> {
                 /// Vectors of another length than the model's, and lengths of the model that do not fit together, are errors of the run.
                 #vis fn state(
                     &self,
-                    q: impl ::core::convert::Into<#path::__private::List>,
-                    v: impl ::core::convert::Into<#path::__private::List>,
+                    q: impl ::core::convert::AsRef<[::core::primitive::f64]>,
+                    v: impl ::core::convert::AsRef<[::core::primitive::f64]>,
                 ) -> #path::__private::FamilyState {
-                    #path::__private::family_state(self, 0.0, q.into(), v.into())
+                    #path::__private::family_state(self, 0.0, q, v)
                 }
 
                 /// What was derived from the declaration: a page when printed.

@@ -119,7 +119,7 @@ pub mod __private {
     pub use crate::family::{
         Block, Controlled as FamilyControlled, Entries, FamilyState, Gradient,
         Model as FamilyModel, ModelError as FamilyError, STRIDE, Sweep, checks,
-        observable as family_observable, observables as family_observables, state as family_state,
+        observable as family_observable, observables as family_observables,
     };
     pub use crate::length::{Declared, RunTimeLength};
     pub use crate::model::{
@@ -141,6 +141,17 @@ pub mod __private {
     /// Coordinates or velocities of a model of run-time length.
     #[cfg(feature = "alloc")]
     pub type List = alloc::vec::Vec<f64>;
+
+    /// The state of coordinates and velocities of a model of run-time length.
+    #[cfg(feature = "alloc")]
+    pub fn family_state<M: FamilyModel>(
+        model: &M,
+        t: f64,
+        q: impl AsRef<[f64]>,
+        v: impl AsRef<[f64]>,
+    ) -> FamilyState {
+        crate::family::state(model, t, q.as_ref().to_vec(), v.as_ref().to_vec())
+    }
 
     /// The state of coordinates and velocities; a momentum that does not exist is NaN, which the
     /// first step refuses.

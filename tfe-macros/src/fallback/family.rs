@@ -158,10 +158,10 @@ pub(super) fn stubs(
         impl #impl_generics #name #type_generics #where_clause {
             #vis fn state(
                 &self,
-                __tfe_q: impl ::core::convert::Into<#private::List>,
-                __tfe_v: impl ::core::convert::Into<#private::List>,
+                __tfe_q: impl ::core::convert::AsRef<[::core::primitive::f64]>,
+                __tfe_v: impl ::core::convert::AsRef<[::core::primitive::f64]>,
             ) -> #private::FamilyState {
-                #private::FamilyState { q: __tfe_q.into(), p: __tfe_v.into() }
+                #private::family_state(self, 0.0, __tfe_q, __tfe_v)
             }
 
             #vis fn structure() -> #private::Structure {
