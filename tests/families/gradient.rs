@@ -211,6 +211,42 @@ fn gradients_backwards_are_derivatives_forwards() {
     assert!(off_stiff < 10.0 * ROUNDING, "{off_stiff:.1e}");
 }
 
+/// Two heavy sites on a spring of their own, beside light ones on weak springs: what the gradient has of them is smaller by their mass, with as many digits.
+#[test]
+fn gradients_of_heavy_sites_keep_their_digits() {
+    let model = Chain {
+        n: 5,
+        m: vec![1e15, 1e15, 1.0, 1.0, 1.0],
+        k: vec![1e15, 1e-6, 1e-6, 1e-6],
+        b: 0.0,
+        c: 0.0,
+        f: 0.0,
+        omega: 1.3,
+    };
+    let start = model.state([0.4, -0.2, 0.1, 0.4, -0.5], [0.3, 0.0, -0.3, 0.2, 0.4]);
+    let run = Simulation::new(&model).element(Element::mixed(4)).step(0.5);
+    let loss = Loss::of_end(|q, _, _| q[0] + q[4]);
+    let gradient = run.gradient(start.clone(), 0.0..3.0, &loss);
+    let (_, gradient) = gradient.expect("a gradient");
+    let s = run.run_sensitive(start, 0.0..3.0).expect("derivatives");
+    let matrix = s.by_start().last();
+    let by = |name: &str| {
+        let last = s.by(name).last();
+        (gradient.by(name), last.q[0] + last.q[4])
+    };
+    let of_start = gradient.by_start();
+    for (found, expected) in [
+        by("k[0]"),
+        by("m[0]"),
+        by("k[3]"),
+        (of_start.p[0], matrix[(5, 0)] + matrix[(9, 0)]),
+        (of_start.q[0], matrix[(5, 5)] + matrix[(9, 5)]),
+    ] {
+        let off = (found / expected - 1.0).abs();
+        assert!(off < 1e-9, "{found:e} {expected:e}: {off:e}");
+    }
+}
+
 /// A hundred sites and two hundred parameters.
 #[test]
 fn a_hundred_sites_backwards_and_forwards() {

@@ -194,6 +194,45 @@ fn gradients_by_many_parameters_are_derivatives_forwards() {
     }
 }
 
+/// A heavy body on a spring of its own, beside light ones on weak springs: what the gradient has of it is smaller by its mass, with as many digits.
+#[test]
+fn gradients_of_heavy_bodies_keep_their_digits() {
+    let row = Row {
+        m: [1e15, 1.0, 1.0, 1.0, 1.0],
+        k: [1e-6, 1e-6, 1e-6, 1e-6, 1e15],
+        a: [0.0; 4],
+        c: [0.0; 4],
+        b: 0.0,
+        f: 0.0,
+        ..ROW
+    };
+    let start = row.state([0.4, -0.2, 0.1, 0.4, -0.5], [0.3, 0.0, -0.3, 0.2, 0.4]);
+    let simulation = Simulation::new(&row).element(Mixed::<4>).step(0.6);
+    let loss = Loss::at_end(|node: &Node<5>| node.q[0] + node.q[4]);
+    let gradient = simulation.gradient(start, 0.0..3.0, &loss);
+    let (_, gradient) = gradient.expect("a gradient");
+    let s = simulation
+        .run_sensitive(start, 0.0..3.0)
+        .expect("derivatives");
+    let matrix = s.by_start().last();
+    let (by_q, by_p) = (matrix.q_by_q(), matrix.q_by_p());
+    let by = |name: &str| {
+        let last = s.by(name).last();
+        (gradient.by(name), last.q[0] + last.q[4])
+    };
+    let of_start = gradient.by_start();
+    for (found, expected) in [
+        by("k[4]"),
+        by("m[0]"),
+        by("k[3]"),
+        (of_start.p[0], by_p[(0, 0)] + by_p[(4, 0)]),
+        (of_start.q[0], by_q[(0, 0)] + by_q[(4, 0)]),
+    ] {
+        let off = (found / expected - 1.0).abs();
+        assert!(off < 1e-9, "{found:e} {expected:e}: {off:e}");
+    }
+}
+
 /// Some of many parameters, in any order, have what they have among all.
 #[test]
 fn some_parameters_backwards_are_those_among_all() {

@@ -13,6 +13,7 @@ use crate::inside::{InsideLoss, Seeds};
 use crate::lu::Block;
 use crate::model::{First, Form, Model};
 use crate::phase_form::PhaseForm;
+use crate::real::Real;
 use crate::tape::{Places, Tape};
 use crate::velocity_form::{PointDerivatives, VelocityForm};
 use alloc::vec::Vec;
@@ -159,6 +160,8 @@ struct Points<const N: usize> {
     momentum_q: Vec<[[f64; N]; N]>,
     /// One where it is constant.
     masses: Vec<Mass<N>>,
+    /// None where masses are alike.
+    units: Option<[Units; N]>,
     mu: Vec<[f64; N]>,
     /// What a loss has of the inside.
     seeds: Seeds,
@@ -245,6 +248,14 @@ impl<const N: usize> Points<N> {
             if !M::FACTS.separable {
                 self.momentum_q.push(second.zq);
             }
+            if self.masses.is_empty() {
+                let mut masses = [0.0; N];
+                for a in 0..N {
+                    masses[a] = second.zz[a][a];
+                }
+                let largest = largest_of_unlike(&masses);
+                self.units = largest.map(|largest| masses.map(|mass| units(mass, largest)));
+            }
             if self.masses.is_empty() || !M::FACTS.constant_mass {
                 let Some(mass) = Mass::of(&second.zz) else {
                     return Ok(false);
@@ -274,35 +285,87 @@ impl<const N: usize> Points<N> {
     }
 }
 
+/// √m and m of a coordinate, beside the largest: of a loss of coordinates alone m μ is of one size, where μ of a heavy body is small beside that of a light one.
+pub(crate) type Units = [f64; 2];
+
+/// The largest of some masses, where they are not much alike.
+pub(crate) fn largest_of_unlike(masses: &[f64]) -> Option<f64> {
+    /// Up to this multiple a digit is lost.
+    const ALIKE: f64 = 16.0;
+
+    let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
+    for mass in masses {
+        least = least.min(mass.abs());
+        largest = largest.max(mass.abs());
+    }
+    let is_unlike = least > 0.0 && largest.is_finite() && largest > ALIKE * least;
+    is_unlike.then_some(largest)
+}
+
+/// Those of a mass.
+pub(crate) fn units(mass: f64, largest: f64) -> Units {
+    let part = mass.abs() / largest;
+    [Real::sqrt(part), part]
+}
+
 /// Whether the iteration of (T-150) goes on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Judge {
     before: f64,
+    /// The same in other units, as long as increments shrink there.
+    others: [Option<f64>; 2],
+    has_converged: bool,
 }
 
 impl Default for Judge {
     fn default() -> Self {
         Self {
             before: f64::INFINITY,
+            others: [Some(f64::INFINITY); 2],
+            has_converged: false,
         }
     }
 }
 
 impl Judge {
-    /// Sees the largest increment of μ and the largest μ; whether it has converged, once that is known.
-    #[inline(always)]
-    pub(crate) fn see(&mut self, increment: f64, size: f64) -> Option<bool> {
-        /// Each increment is at most this part of the one before, or factors cost less.
-        const CONTRACTION: f64 = 0.2;
-        /// Increments beside μ that are roundings.
-        const ROUNDING: f64 = 1e-16;
+    /// Increments beside μ that are roundings.
+    const ROUNDING: f64 = 1e-16;
+    /// Each increment is at most this part of the one before, or factors cost less.
+    const CONTRACTION: f64 = 0.2;
 
-        if increment <= ROUNDING * size {
+    /// Sees the largest increment of μ and the largest μ, and the same in other [`Units`], zeros where masses are alike; whether it has converged, once that is known. Other units prolong it alone.
+    #[inline(always)]
+    pub(crate) fn see(
+        &mut self,
+        increment: f64,
+        size: f64,
+        others: [(f64, f64); 2],
+    ) -> Option<bool> {
+        for k in 0..2 {
+            let (increment, size) = others[k];
+            if let Some(before) = self.others[k] {
+                let is_left = increment > Self::ROUNDING * size;
+                let shrinks = increment <= Self::CONTRACTION * before;
+                self.others[k] = (is_left && shrinks).then_some(increment);
+            }
+        }
+        if !self.has_converged {
+            match self.judge(increment, size) {
+                Some(true) => self.has_converged = true,
+                other => return other,
+            }
+        }
+        (self.others == [None; 2]).then_some(true)
+    }
+
+    #[inline(always)]
+    fn judge(&mut self, increment: f64, size: f64) -> Option<bool> {
+        if increment <= Self::ROUNDING * size {
             return Some(true);
         }
-        if !(increment <= CONTRACTION * self.before) {
+        if !(increment <= Self::CONTRACTION * self.before) {
             // Roundings do not shrink.
-            return Some(increment <= 64.0 * ROUNDING * size);
+            return Some(increment <= 64.0 * Self::ROUNDING * size);
         }
         self.before = increment;
         None
@@ -335,6 +398,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
             force_v,
             momentum_q,
             masses,
+            units,
             mu,
             seeds,
             pulled,
@@ -372,6 +436,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
                 }
             }
             let (mut increment, mut size) = (0.0_f64, 0.0_f64);
+            let mut others = [(0.0_f64, 0.0_f64); 2];
             for j in 0..points {
                 let mut row = rows[j];
                 for l in 0..points {
@@ -387,10 +452,17 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
                         increment
                     };
                     size = size.max(row[a].abs());
+                    if let Some(units) = units {
+                        for k in 0..2 {
+                            let (increment, size) = &mut others[k];
+                            *increment = increment.max(units[a][k] * change);
+                            *size = size.max(units[a][k] * row[a].abs());
+                        }
+                    }
                     mu[j][a] = row[a];
                 }
             }
-            if let Some(verdict) = judge.see(increment, size) {
+            if let Some(verdict) = judge.see(increment, size, others) {
                 return verdict;
             }
         }

@@ -1,7 +1,7 @@
 //! The transposed equations of an element M q̈ = f, iterated as the element itself is (T-150).
 
 use super::written::Points;
-use crate::backwards::Judge;
+use crate::backwards::{Judge, Units, largest_of_unlike, units};
 use crate::family::inertia::Inertia;
 use crate::family::model::{Block, Gradient, Model};
 use crate::family::pattern::Pattern;
@@ -25,6 +25,8 @@ pub(super) struct Iteration {
     position: Vec<Points>,
     points: usize,
     inverse_mass: Vec<f64>,
+    /// None where masses are alike.
+    units: Option<Vec<Units>>,
     /// Places of second derivatives by coordinates, of forces by velocities, and of forces by coordinates.
     parts: [Part; 3],
     /// Second derivatives, a row for each group.
@@ -81,6 +83,12 @@ impl Iteration {
     /// Of a collocated element.
     pub(super) fn new(scheme: &SchemeRef<'_>, pattern: &Pattern, inertia: Inertia) -> Self {
         let (points, n) = (scheme.points(), inertia.inverse.len());
+        let masses = &inertia.mass;
+        let largest = largest_of_unlike(masses);
+        let own = |largest: f64| -> Vec<Units> {
+            let all = masses.iter();
+            all.map(|mass| units(*mass, largest)).collect()
+        };
         let all = || vec![ZERO; points.div_ceil(4) * n];
         Self {
             weights: grouped(scheme.weights, points),
@@ -88,6 +96,7 @@ impl Iteration {
             force: grouped(scheme.force, points),
             position: grouped(scheme.position, points),
             points,
+            units: largest.map(own),
             inverse_mass: inertia.inverse,
             parts: [Block::QQ, Block::ForceZ, Block::ForceQ].map(|one| Part::of(pattern, one)),
             values: vec![ZERO; points.div_ceil(4) * pattern.places().len()],
@@ -207,6 +216,7 @@ impl Solve<'_> {
             position,
             points,
             inverse_mass,
+            units,
             parts,
             values,
             gradient: _,
@@ -248,6 +258,7 @@ impl Solve<'_> {
                 damping.add_transposed(values, seeds, &mut pushed[own]);
             }
             let (mut increment, mut size) = (ZERO, ZERO);
+            let mut others = [(ZERO, ZERO); 2];
             for g in 0..groups {
                 for a in 0..n {
                     let mut row = ZERO;
@@ -257,6 +268,17 @@ impl Solve<'_> {
                     }
                     row = (pushed[g * n + a] + h * row) * splat(inverse_mass[a]);
                     let old = &mut mu[g * n + a];
+                    if let Some(units) = units {
+                        for k in 0..2 {
+                            let (increment, size) = &mut others[k];
+                            for lane in 0..4 {
+                                let change = units[a][k] * (row.0[lane] - old.0[lane]).abs();
+                                increment.0[lane] = increment.0[lane].max(change);
+                                let value = units[a][k] * row.0[lane].abs();
+                                size.0[lane] = size.0[lane].max(value);
+                            }
+                        }
+                    }
                     for lane in 0..4 {
                         let change = (row.0[lane] - old.0[lane]).abs();
                         // A maximum would ignore what is not a number.
@@ -268,7 +290,12 @@ impl Solve<'_> {
                     *old = row;
                 }
             }
-            if let Some(verdict) = judge.see(largest(increment), largest(size)) {
+            let mut beside = [(0.0, 0.0); 2];
+            for k in 0..2 {
+                let (increment, size) = others[k];
+                beside[k] = (largest(increment), largest(size));
+            }
+            if let Some(verdict) = judge.see(largest(increment), largest(size), beside) {
                 return verdict;
             }
         }
