@@ -139,6 +139,14 @@ where
         finished: &dyn Fn(usize, Outcome<N, FixedLength>),
     ) -> Statistics {
         if let Self::At(starts) = self {
+            if plan.mesh.steps() == 0 {
+                // The first element tells whether they are on the constraints.
+                for (lane, start) in starts.iter().enumerate() {
+                    let model = ensemble.models.model(first + lane);
+                    finished(lane, plan.at_rest(model, start));
+                }
+                return Statistics::default();
+            }
             *self = Self::begin(ensemble, plan, first, starts);
         }
         match self {

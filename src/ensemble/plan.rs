@@ -37,6 +37,16 @@ impl<const N: usize> Plan<N> {
         Node::new(model, self.end, state, &[0.0; N])
     }
 
+    /// A run over no element.
+    pub(super) fn at_rest<M: Model<N>>(
+        &self,
+        model: &M,
+        start: &State<N>,
+    ) -> Result<Node<N>, RunErrorKind> {
+        check_start(start)?;
+        Ok(self.node(model, start))
+    }
+
     /// Up to [`WIDTH`] runs in lanes, from where they are.
     pub(super) fn drive_together<'m, M, T>(
         &self,

@@ -125,10 +125,13 @@ where
                     run.impulses.retain(|one| !is_behind(M::time_of(one)));
                     run.mesh(span)
                 })?;
+            // Before the first element nothing has looked at the start.
+            if !is_same || direction == 0.0 {
+                self.check_constraints_at((&place.0, place.1), (time, state))?;
+            }
             let node = match is_same {
                 true => self.node_of(checkpoint, &mut stepper),
                 false => {
-                    self.check_other((&place.0, place.1), (time, state))?;
                     let at = (time, state);
                     M::node(&mut stepper, &*self.model, at, &checkpoint.velocity)
                 }
@@ -172,8 +175,8 @@ where
         Node::of(time, state, known.clone())
     }
 
-    /// Refuses a state that another model had reached, where it is not on the constraints of this one.
-    fn check_other(
+    /// Refuses a state that another model had reached, or none, where it is not on the constraints of this one.
+    fn check_constraints_at(
         &self,
         (mesh, done): (&Mesh<N>, usize),
         (time, state): (f64, &L::State),

@@ -80,6 +80,26 @@ fn two_halves_are_one_run_to_the_bit() {
     halves(&Ensemble::of_models(&models), &start, (20, 0.1), &mut seed);
 }
 
+/// A start beside the constraints is refused by the first element, also behind a span without any.
+#[test]
+fn starts_beside_constraints_are_refused_after_an_empty_span() {
+    let rod = Rod { g: 9.81 };
+    let starts = [1.1, 1.0].map(|x| rod.state([x, 0.0], [0.0, 0.3]));
+    let is_refused = |kind: &RunErrorKind| matches!(kind, RunErrorKind::Inconsistent { .. });
+    let ensemble = Ensemble::new(&rod).step(0.05);
+    let mut run = ensemble.begin(&starts, 0.0).expect("starts");
+    assert_eq!(run.run_to(0.0).expect("nothing to do").nodes().count(), 2);
+    let ends = run.run_to(0.5).expect("runs");
+    let whole = ensemble.run(&starts, 0.0..0.5).expect("runs");
+    assert!(whole.iter().eq(ends.iter()), "{whole:?}, {ends:?}");
+    assert!(ends[0].as_ref().is_err_and(is_refused), "{ends:?}");
+    let simulation = Simulation::new(&rod).step(0.05);
+    let still = simulation.run(starts[0], 0.0..0.0).expect("nothing to do");
+    let checkpoint = still.checkpoint().expect("a whole run");
+    let error = simulation.resume(checkpoint, 0.5).expect_err("no start");
+    assert!(is_refused(error.kind()), "{error}");
+}
+
 /// Times beside the grid begin it anew; a bad end changes nothing.
 #[test]
 fn ensembles_stop_where_they_are_told() {
