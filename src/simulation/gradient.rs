@@ -259,7 +259,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
             element += 1;
         }
         let ends = (&before.state(), &after.state());
-        let is_same = is_same::<N, FixedLength>(&state, ends);
+        let is_same = is_same::<N, FixedLength>(&state, ends, 0.0);
         Ok(is_same.then_some(motion))
     }
 
@@ -286,7 +286,9 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
             let pieces = self.stepper.dense(time, next).pieces().len();
             let is_cut_alike = inside.is_empty() || inside.len() == pieces;
             let after = motion.states()[number + 1].state();
-            if !(is_same::<N, FixedLength>(&state, (&before, &after)) && is_cut_alike) {
+            // Where a tolerance was left derivatives forwards are those of what was computed.
+            let is_same = is_same::<N, FixedLength>(&state, (&before, &after), 0.0);
+            if !(is_same && is_cut_alike) {
                 return Ok(false);
             }
             let (lambda, by_parameters) = (&mut self.lambda, &mut self.by_parameters);

@@ -46,10 +46,14 @@ impl Element {
             .map_or(&self.before, |kicked| &kicked.before)
     }
 
-    /// Whether it ends where it did, now that it is solved once more.
+    /// Whether it ends where it did, now that it is solved once more; it was left at a tolerance.
     #[cfg(feature = "sparse")]
-    pub(super) fn check(&self, again: &FamilyState) -> Result<(), family::OperatorError> {
-        match is_same::<0, RunTimeLength>(again, (&self.before, &self.after)) {
+    pub(super) fn check(
+        &self,
+        again: &FamilyState,
+        tolerance: f64,
+    ) -> Result<(), family::OperatorError> {
+        match is_same::<0, RunTimeLength>(again, (&self.before, &self.after), tolerance) {
             true => Ok(()),
             false => Err(family::OperatorError::Cut),
         }
@@ -57,18 +61,23 @@ impl Element {
 }
 
 /// Whether elements that are solved once more, from the first state, end in the second as they did, to many more digits than two roots of their equations have in common. The first one tells, too, of what
-/// roundings are a part: a motion may come to rest at the end, or pass its origin.
+/// roundings are a part: a motion may come to rest at the end, or pass its origin. Iterations may leave a tolerance of either.
 pub(super) fn is_same<const N: usize, L: Length<N>>(
     again: &L::State,
     (start, end): (&L::State, &L::State),
+    tolerance: f64,
 ) -> bool {
     const SAME: f64 = 1e-9;
+    /// Of the tolerance: both are off by one, and it is that of a larger number beside them.
+    const LEFT: f64 = 4.0;
+
+    let same = SAME.max(LEFT * tolerance);
     let near = |again: &L::Vector, start: &L::Vector, end: &L::Vector| {
         let (again, start, end) = (again.as_ref(), start.as_ref(), end.as_ref());
         let both = start.iter().chain(end);
         let largest = both.fold(0.0_f64, |m, x| m.max(x.abs()));
         let mut pairs = again.iter().zip(end);
-        pairs.all(|(a, b)| (a - b).abs() <= SAME * largest.max(1e-6))
+        pairs.all(|(a, b)| (a - b).abs() <= same * largest.max(1e-6))
     };
     let (again, start, end) = (L::parts(again), L::parts(start), L::parts(end));
     near(again.0, start.0, end.0) && near(again.1, start.1, end.1)

@@ -247,6 +247,32 @@ fn gradients_of_heavy_sites_keep_their_digits() {
     }
 }
 
+/// Elements that were left at a tolerance end beside where they end when they are solved once more; derivatives are as good as that.
+#[test]
+fn runs_with_a_tolerance_have_derivatives() {
+    let (model, start) = chain(12);
+    let loss: Loss<'_> = Loss::output_at_end("middle");
+    let found = |tolerance: Option<f64>| {
+        let run = Simulation::new(&model).step(0.25);
+        let run = match tolerance {
+            Some(tolerance) => run.tolerance(tolerance),
+            None => run,
+        };
+        let gradient = run.gradient(start.clone(), 0.0..1.0, &loss);
+        let (_, gradient) = gradient.expect("a gradient");
+        let kept = run.clone().record_every(2);
+        let kept = kept.gradient(start.clone(), 0.0..1.0, &loss);
+        let (_, kept) = kept.expect("a gradient");
+        let s = run.run_sensitive(start.clone(), 0.0..1.0);
+        let slopes = s.expect("derivatives").by("c").output("middle");
+        let slope = slopes.and_then(|all| all.last().copied());
+        [gradient.by("c"), kept.by("c"), slope.expect("declared")]
+    };
+    for (rough, fine) in found(Some(1e-4)).into_iter().zip(found(None)) {
+        assert!((rough - fine).abs() < 1e-3 * fine.abs(), "{rough} {fine}");
+    }
+}
+
 /// A hundred sites and two hundred parameters.
 #[test]
 fn a_hundred_sites_backwards_and_forwards() {

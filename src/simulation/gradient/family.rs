@@ -166,7 +166,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 return Ok(None);
             };
             let ends = (&before.state(), &after.state());
-            if !is_same::<0, RunTimeLength>(&again.last().state(), ends) {
+            if !is_same::<0, RunTimeLength>(&again.last().state(), ends, self.control.tolerance) {
                 return Ok(None);
             }
             let (value, seen) = part.seen(&again, &*self.model)?;
@@ -209,7 +209,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 let inside = view.of_element(backwards, &motion.elements()[number])?;
                 let place = (element.t, element.h);
                 let end = backwards.pass(place, &element.before, inside.first())?;
-                element.check(&end)?;
+                element.check(&end, self.control.tolerance)?;
                 if let Some(kicked) = &element.kicked {
                     backwards.kick(element.t, &kicked.with)?;
                 }

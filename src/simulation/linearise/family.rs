@@ -51,7 +51,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let steps = steps.map(|element| (element.t, element.h, &element.before));
         let each = |transition: family::TransitionOperator| {
             let element: &Element = &elements[transitions.len()];
-            element.check(transition.end())?;
+            element.check(transition.end(), self.control.tolerance)?;
             let mut matrix = transition.matrix();
             if let Some(kicked) = &element.kicked {
                 let kick = family::Kick::of(&*self.model, element.t, &kicked.with, &[])?;

@@ -69,7 +69,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let mut passed = 0;
         let each = |transition: family::TransitionOperator| {
             let element = &trail.elements[passed];
-            element.check(transition.end())?;
+            element.check(transition.end(), self.control.tolerance)?;
             if let Some(kicked) = &element.kicked {
                 let kick = family::Kick::of(model, element.t, &kicked.with, &parameters)?;
                 for mut column in current.column_iter_mut() {
