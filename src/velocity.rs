@@ -8,7 +8,7 @@ use tfe_runtime::{Model, State};
 /// The velocities that belong to states of a model.
 pub trait Velocity<const N: usize, L: Length<N> = FixedLength>: Evaluate<N, L> {
     /// dq/dt of a state at the time t: v with ∂L/∂v = p, or ∂H/∂p. Where the mass matrix is singular it is the velocity that constraints leave (theory.md (T-74)), NaN where they leave none, where the iteration for v of a kinetic
-    /// energy that is not quadratic fails, or where the state is not as long as the model.
+    /// energy that is not quadratic fails, or, as long as the state, where that is not as long as the model.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -46,6 +46,8 @@ impl<M: family::Model> Velocity<0, RunTimeLength> for M {
         let n = self.len();
         let fits = self.check().is_ok() && (state.q.len(), state.p.len()) == (n, n);
         let found = fits.then(|| Evaluate::velocity(self, t, state, &state.p));
-        found.flatten().unwrap_or_else(|| vec![f64::NAN; n])
+        // Of a length that does not fit there may be no memory for a vector.
+        let unknown = || vec![f64::NAN; state.q.len()];
+        found.flatten().unwrap_or_else(unknown)
     }
 }

@@ -161,6 +161,7 @@ fn states_of_another_length_are_refused() {
     let run = Simulation::new(&model).run(start.clone(), 0.0..1.0);
     let kind = run.expect_err("a wrong start").kind().clone();
     assert_eq!(kind, RunErrorKind::Family(error("p", 4)));
+    assert_eq!(family::velocity(&model, 0.0, &start), Err(error("p", 4)));
     let mut steps = Simulation::new(&model).step(0.1).steps(start, 0.0);
     assert_eq!(steps.next(), Some(Err(RunErrorKind::Family(error("p", 4)))));
     assert_eq!(steps.next(), None);
@@ -183,6 +184,8 @@ fn an_absurd_length_is_an_error() {
         let error = error.expect_err("a wrong length");
         assert!(matches!(error.kind(), RunErrorKind::Family(_)), "{error}");
         assert!(momenta(&model, 0.0, &[0.0; 2], &[0.0; 2]).is_err());
+        let velocity = model.velocity(0.0, &model.state([0.0; 2], [0.0; 2]));
+        assert!(velocity.len() == 2 && velocity.iter().all(|v| v.is_nan()));
     }
 }
 

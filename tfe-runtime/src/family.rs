@@ -86,39 +86,48 @@ pub fn state<M: Model>(model: &M, t: f64, q: Vec<f64>, v: Vec<f64>) -> FamilySta
 /// [`ModelError`] where the model does not fit together, a vector has another length, or no momentum belongs to the velocities.
 pub fn momenta<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Result<Vec<f64>, ModelError> {
     model.check()?;
-    let expected = model.len();
-    for (vector, length) in [("q", q.len()), ("v", v.len())] {
-        if length != expected {
-            return Err(ModelError::StateLength {
-                vector,
-                length,
-                expected,
-            });
-        }
-    }
+    check_lengths(model, [("q", q.len()), ("v", v.len())])?;
     match M::FORM {
         Form::Lagrangian => Ok(slope(model, t, q, v)),
         Form::Hamiltonian => Legendre::default().other(model, t, q, v),
     }
 }
 
-/// The velocities dq/dt at a state.
+/// The velocities dq/dt at a state of a model that has been [checked](Model::check).
 ///
 /// # Errors
-/// [`ModelError::MassNotDiagonal`], [`ModelError::SingularMass`] of a Lagrangian.
+/// [`ModelError::StateLength`]; of a Lagrangian [`ModelError::MassNotDiagonal`], [`ModelError::SingularMass`], [`ModelError::NoVelocity`].
 pub fn velocity<M: Model>(model: &M, t: f64, state: &FamilyState) -> Result<Vec<f64>, ModelError> {
+    check_lengths(model, [("q", state.q.len()), ("p", state.p.len())])?;
     Legendre::default().velocity(model, t, state)
+}
+
+/// Refuses vectors that are not as long as the model.
+fn check_lengths<M: Model>(
+    model: &M,
+    vectors: [(&'static str, usize); 2],
+) -> Result<(), ModelError> {
+    let expected = model.len();
+    match vectors.into_iter().find(|(_, length)| *length != expected) {
+        None => Ok(()),
+        Some((vector, length)) => Err(ModelError::StateLength {
+            vector,
+            length,
+            expected,
+        }),
+    }
 }
 
 /// The velocities that constraints leave of a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, [`velocity`].
 ///
 /// # Errors
-/// [`ModelError::NoVelocity`] where there are none, [`ModelError::ConstraintsNotSupported`] without the feature `sparse`.
+/// [`ModelError::NoVelocity`] where there are none, [`ModelError::StateLength`], [`ModelError::ConstraintsNotSupported`] without the feature `sparse`.
 pub fn allowed_velocity<M: Model>(
     model: &M,
     t: f64,
     state: &FamilyState,
 ) -> Result<Vec<f64>, ModelError> {
+    check_lengths(model, [("q", state.q.len()), ("p", state.p.len())])?;
     if !M::CONSTRAINED {
         return velocity(model, t, state);
     }
@@ -147,6 +156,9 @@ pub fn reactions<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Option<Ve
 }
 
 /// The energy H = p·v − L, or H itself, at a state with its velocities.
+///
+/// # Panics
+/// Where a vector is shorter than the model.
 #[must_use]
 pub fn energy<M: Model>(model: &M, t: f64, state: &FamilyState, v: &[f64]) -> f64 {
     energy_at(model, t, (&state.q, &state.p), v)
@@ -180,6 +192,9 @@ pub fn energy_rounding<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v:
 }
 
 /// The largest |φ| and the largest |A v + a| over the constraints; zeros where there are none.
+///
+/// # Panics
+/// Where a vector is shorter than the model.
 #[must_use]
 pub fn constraint_residual<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> (f64, f64) {
     struct Rates<'a> {
@@ -236,16 +251,7 @@ pub fn observables<M: Model>(
         Form::Lagrangian => "v",
         Form::Hamiltonian => "p",
     };
-    let expected = model.len();
-    for (vector, length) in [("q", q.len()), (second, z.len())] {
-        if length != expected {
-            return Err(ModelError::StateLength {
-                vector,
-                length,
-                expected,
-            });
-        }
-    }
+    check_lengths(model, [("q", q.len()), (second, z.len())])?;
     let mut values = vec![0.0; model.columns()];
     model.observables(t, q, z, &mut values);
     let (first, count) = place();
