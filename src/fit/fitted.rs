@@ -45,7 +45,7 @@ impl<M, const N: usize> Fitted<M, N> {
         self.motion.states()[0].state()
     }
 
-    /// What was looked for: parameters, then `q[0]`, …, `p[0]`, … of a start that was not known, by the names of coordinates, as `theta at the start`.
+    /// What was looked for: parameters, then of a start that was not known all momenta and all coordinates, as `momentum of theta at the start` and `theta at the start`.
     pub fn names(&self) -> &[String] {
         &self.names
     }
