@@ -221,7 +221,7 @@ impl HeatMap {
                     }
                 }
             }
-            bar.iter().try_for_each(|bar| bar.draw(canvas, &plot.frame))
+            bar.iter().try_for_each(|bar| bar.draw(canvas, &plot))
         })
     }
 
@@ -472,13 +472,12 @@ impl ColourBar {
         }
     }
 
-    fn draw(&self, canvas: &Canvas<'_>, map: &Frame) -> Result<(), ChartError> {
-        let frame = self.frame(map);
+    fn draw(&self, canvas: &Canvas<'_>, plot: &Plot) -> Result<(), ChartError> {
+        let frame = self.frame(&plot.frame);
         canvas.border(&frame, Colour::BLACK)?;
         draw_ticks(canvas, frame.right, &frame, &self.ticks, Side::Right)?;
-        let x = map.right + self.width() - 14.0;
-        let middle = f64::midpoint(frame.top, frame.bottom);
-        canvas.text(&self.extent.label, (x, middle), Anchor::Upwards, TEXT + 1.0)
+        let x = plot.frame.right + self.width() - 14.0;
+        plot.draw_upwards(canvas, &self.extent.label, x)
     }
 }
 

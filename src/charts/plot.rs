@@ -10,6 +10,8 @@ use super::error::ChartError;
 const TICK: f64 = 5.0;
 /// Size of the title.
 const TITLE: f64 = 16.0;
+/// Between the end of a title or a label and the side of the picture, in pixels.
+const BESIDE_TEXT: f64 = 4.0;
 
 /// Two axes around a frame.
 pub(super) struct Plot {
@@ -18,6 +20,8 @@ pub(super) struct Plot {
     pub(super) y: Extent,
     x_ticks: Vec<Tick>,
     y_ticks: Vec<Tick>,
+    /// Of the picture, in pixels.
+    sides: (f64, f64),
 }
 
 /// What a picture needs around its frame, in pixels.
@@ -67,6 +71,7 @@ impl Plot {
             y,
             x_ticks,
             y_ticks,
+            sides: (width, f64::from(room.sides.1)),
         }
     }
 
@@ -146,17 +151,40 @@ impl Plot {
             canvas.text(text, (x, y + 9.0), Anchor::Top, TEXT)?;
         }
         draw_ticks(canvas, frame.left, frame, &self.y_ticks, Side::Left)?;
+        let (width, _) = self.sides;
         let middle = f64::midpoint(frame.left, frame.right);
-        canvas.text(
-            &self.x.label,
-            (middle, frame.bottom + 31.0),
-            Anchor::Top,
-            TEXT + 1.0,
-        )?;
-        let middle = f64::midpoint(frame.top, frame.bottom);
-        canvas.text(&self.y.label, (16.0, middle), Anchor::Upwards, TEXT + 1.0)?;
-        canvas.text(title, (frame.left, 22.0), Anchor::Left, TITLE)
+        let (label, size) = fitted(&self.x.label, TEXT + 1.0, around(middle, width));
+        canvas.text(&label, (middle, frame.bottom + 31.0), Anchor::Top, size)?;
+        self.draw_upwards(canvas, &self.y.label, 16.0)?;
+        let (title, size) = fitted(title, TITLE, width - frame.left - BESIDE_TEXT);
+        canvas.text(&title, (frame.left, 22.0), Anchor::Left, size)
     }
+
+    /// The label of an upright axis, its middle at `x` and half way up the frame.
+    pub(super) fn draw_upwards(
+        &self,
+        canvas: &Canvas<'_>,
+        label: &str,
+        x: f64,
+    ) -> Result<(), ChartError> {
+        let middle = f64::midpoint(self.frame.top, self.frame.bottom);
+        let (label, size) = fitted(label, TEXT + 1.0, around(middle, self.sides.1));
+        canvas.text(&label, (x, middle), Anchor::Upwards, size)
+    }
+}
+
+/// The length of the longest text around `middle` in a picture of this side.
+fn around(middle: f64, side: f64) -> f64 {
+    2.0 * (middle.min(side - middle) - BESIDE_TEXT)
+}
+
+/// A text that has so many pixels, and its size: at most a quarter smaller than usual, then cut.
+fn fitted(text: &str, usual: f64, room: f64) -> (String, f64) {
+    let width = CHARACTER / TEXT;
+    // Rounding must not cut what just fits.
+    let room = room * (1.0 + 1e-9);
+    let size = (room / (width * text.chars().count() as f64)).clamp(0.75 * usual, usual);
+    (shortened(text, (room / (width * size)) as usize), size)
 }
 
 /// Ticks along a frame of this width, their labels apart: about 90 pixels, or more where they are long.

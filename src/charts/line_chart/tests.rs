@@ -154,6 +154,58 @@ fn long_labels_stand_apart_and_inside_the_picture() {
 }
 
 #[test]
+fn long_titles_and_labels_end_inside_the_picture() {
+    let long = |start: &str| format!("{start} {}", "of everything ".repeat(30));
+    let usual = waves().to_svg().unwrap();
+    for (width, height) in [(240, 240), (720, 440), (1200, 300)] {
+        let chart = Chart::new(long("title")).x(long("across")).y(long("up"));
+        let chart = chart.line("", [(0.0, 0.0), (1.0, 1.0)]).size(width, height);
+        let svg = chart.to_svg().unwrap();
+        let document = Document::parse(&svg).unwrap();
+        let mut cut = 0;
+        for node in document.descendants() {
+            let Some(text) = node.text().filter(|_| node.tag_name().name() == "text") else {
+                continue;
+            };
+            let number = |name: &str| -> f64 { node.attribute(name).unwrap().parse().unwrap() };
+            // At 7 pixels a character of 12.
+            let length = number("font-size") * 7.0 / 12.0 * text.trim().chars().count() as f64;
+            let is_upwards = node.attribute("transform").is_some();
+            let (at, side) = if is_upwards {
+                (number("y"), height)
+            } else {
+                (number("x"), width)
+            };
+            let (before, behind) = match node.attribute("text-anchor") {
+                Some("start") => (0.0, length),
+                Some("end") => (length, 0.0),
+                _ => (0.5 * length, 0.5 * length),
+            };
+            assert!(at - before >= 0.0, "{text} of {width}");
+            assert!(at + behind <= 10.0 * f64::from(side), "{text} of {width}");
+            cut += usize::from(text.trim().ends_with('…'));
+        }
+        assert_eq!(cut, 3, "{width}");
+    }
+    // A short one has its usual size, a longer one is smaller, and whole.
+    let size = |svg: &str, title: &str| -> f64 {
+        let document = Document::parse(svg).unwrap();
+        let mut nodes = document.descendants();
+        let node = nodes.find(|node| node.text().is_some_and(|text| text.trim() == title));
+        node.unwrap()
+            .attribute("font-size")
+            .unwrap()
+            .parse()
+            .unwrap()
+    };
+    assert!((size(&usual, "a < b & \"c\"") - 160.0).abs() < 1e-9);
+    let title = "w".repeat(76);
+    let longer = Chart::new(title.as_str()).line("", [(0.0, 0.0), (1.0, 1.0)]);
+    let smaller = size(&longer.to_svg().unwrap(), &title);
+    assert!((120.0..159.0).contains(&smaller), "{smaller}");
+}
+
+#[test]
 fn curves_that_end_far_away_keep_their_slope() {
     let unit = || Axis::new("").range(0.0..1.0);
     let svg = Chart::new("")
