@@ -83,6 +83,8 @@ const MOST_CELLS: usize = 1 << 28;
 const BAR: (f64, f64) = (16.0, 16.0);
 /// Height of a row of the legend above the frame.
 const LINE: f64 = 22.0;
+/// Where the legend begins at most, however wide the labels of the rows are, and where it ends before the side of the picture, in pixels.
+const STRIP: (f64, f64) = (100.0, 20.0);
 /// Of an entry of the legend beside its name: the key and gaps, in pixels.
 const AROUND_NAME: f64 = KEY + 20.0;
 
@@ -210,11 +212,12 @@ impl HeatMap {
                 draw_curve(canvas, &plot, curve, curve_key(k))?;
             }
             plot.draw_axes(canvas, &self.title)?;
+            let left = plot.frame.left.min(STRIP.0);
             let top = plot.frame.top - LINE * strip.len() as f64;
             for (k, line) in strip.iter().enumerate() {
                 let y = top + LINE * (k as f64 + 0.5) - 4.0;
                 for (x, (name, key)) in line {
-                    let at = (plot.frame.left + x, y);
+                    let at = (left + x, y);
                     match key {
                         Some(key) => key.draw_entry(canvas, name, at)?,
                         None => canvas.text(name, at, Anchor::Left, TEXT)?,
@@ -336,7 +339,7 @@ impl HeatMap {
 
     /// The legend above the frame, in lines. Entries that do not fit are counted.
     fn strip(&self) -> Vec<Vec<Placed>> {
-        let width = f64::from(self.size.0) - 120.0;
+        let width = f64::from(self.size.0) - STRIP.0 - STRIP.1;
         // More would leave no map.
         let most = (f64::from(self.size.1) / 4.0 / LINE) as usize;
         let longest = (((width - AROUND_NAME) / CHARACTER) as usize).min(40);

@@ -105,7 +105,9 @@ fn classes_have_their_colours() {
 fn classes_that_the_legend_leaves_out_are_counted() {
     let classes = (0..60).map(|k| Class::new(format!("class number {k}"), Colour::WHITE));
     let map = HeatMap::classes("", (1, 1), classes.collect(), |_, _| Some(0));
-    for width in [240, 720] {
+    // Labels of nineteen characters, left of the map.
+    let wide = map.clone().y(Axis::new("").range(1e9..1e9 + 1e-3));
+    for (map, width) in [(&map, 240), (&map, 720), (&wide, 240), (&wide, 720)] {
         let svg = map.clone().size(width, 440).to_svg().unwrap();
         let document = Document::parse(&svg).unwrap();
         let texts = document
