@@ -290,6 +290,11 @@ pub(super) enum Key {
     Outlined(Colour),
 }
 
+/// Whether two points are one in a picture, whose places are tenths of pixels.
+fn is_near(a: Point, b: Point) -> bool {
+    (a.0 - b.0).abs() < 0.1 && (a.1 - b.1).abs() < 0.1
+}
+
 /// Width of a key in the legend, in pixels.
 pub(super) const KEY: f64 = 26.0;
 /// Width of lines, in pixels.
@@ -298,6 +303,12 @@ const STROKE: f64 = 1.8;
 impl Key {
     /// Draws a line of this kind.
     pub(super) fn draw_line(self, canvas: &Canvas<'_>, line: &[Point]) -> Result<(), ChartError> {
+        if let Some(&first) = line.first()
+            && line.iter().all(|at| is_near(*at, first))
+        {
+            // Nothing would be seen of a line without length, as of a motion at rest.
+            return self.draw_dot(canvas, first);
+        }
         match self {
             Self::Line(colour) | Self::LineWithMarkers(colour, _) => {
                 canvas.line(line, colour, STROKE)

@@ -264,6 +264,11 @@ fn points_without_neighbours_are_dots() {
     for style in [Style::Line, Style::LineWithMarkers, Style::Reference] {
         assert_eq!(dots(style, &gaps[..1]), 1, "{style:?}");
     }
+    // A motion at rest: a line without length, which is not seen.
+    for style in [Style::Line, Style::Reference] {
+        assert_eq!(dots(style, &[(1.0, 1.0); 3]), 1, "{style:?}");
+    }
+    assert_eq!(dots(Style::LineWithMarkers, &[(1.0, 1.0); 3]), 3);
 }
 
 #[test]
