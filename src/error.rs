@@ -131,7 +131,8 @@ pub enum RunErrorKind {
         /// Those that there are.
         known: Vec<String>,
     },
-    /// An event came a thousand times within one step, or twice within a millionth of it: the motion comes to rest by ever shorter ways there.
+    /// An event came a thousand times within one step, or twice within a millionth of it, or forces press a motion through the surface on which an [impact](crate::Occurrence::after_impact) has stopped
+    /// it: the motion comes to rest there.
     EventsWithoutEnd {
         /// The output that changes its sign.
         name: String,

@@ -83,4 +83,6 @@ pub(crate) struct LastCut {
     pub(crate) rises: bool,
     /// Whether the motion went on as if nothing had happened.
     pub(crate) is_idle: bool,
+    /// How fast the surface was met of an impact that has not been seen to throw the motion back; else zero.
+    pub(crate) impact: f64,
 }

@@ -329,6 +329,12 @@ where
             &mut course,
         );
         let mut remaining = Remaining::new(found, ends);
+        if self.has_impacts() {
+            let mut rows = [Vec::new(), Vec::new()];
+            value(0.0, &mut rows[0]);
+            value(1.0, &mut rows[1]);
+            self.check_impacts(&remaining, &rows, t + h)?;
+        }
         while let Some(root) = remaining.first() {
             let crossed = Crossed::from(&root);
             if !self.counts(crossed) {
@@ -381,7 +387,7 @@ where
             p: p.clone(),
             rises,
         };
-        let act = act::act(&*self.model, (on, value), &event);
+        let (act, impact) = act::act(&*self.model, (on, value), &event);
         let goes_by = act == Act::Record;
         let after = act::after(&*self.model, self.remodel, &event, act);
         let place = Place {
@@ -401,11 +407,13 @@ where
         let is_it = |last: LastCut| last.function == function && self.is_soon(last.time, time);
         let returns = after.is_some() && self.seen.last.is_some_and(is_it);
         let is_idle = |after: &After<'m, M, N, L>| after.model.is_none() && after.state == *state;
+        let is_idle = after.as_ref().is_some_and(is_idle);
         let last = Some(LastCut {
             time,
             function,
             rises,
-            is_idle: after.as_ref().is_some_and(is_idle),
+            is_idle,
+            impact: if is_idle { 0.0 } else { impact },
         });
         (self.seen.last, self.seen.lasts[function]) = (last, last);
         if returns || self.cuts > Self::MAX_CUTS {

@@ -72,6 +72,29 @@ fn bounces_without_end_are_told() {
     assert!(error.partial().last().t > 1.0 && error.partial().events().len() > 20);
 }
 
+/// Impacts that leave nothing of the velocity, or less than is seen: it fell through the ground without a word.
+#[test]
+fn what_impacts_stop_does_not_fall_through() {
+    for (e, step) in [(0.0, 0.1), (0.0, 0.01), (1e-11, 0.1), (0.005, 0.1)] {
+        let error = Simulation::new(&BALL)
+            .step(step)
+            .on("height", Crossing::Falling, move |event| {
+                Act::Restart(event.after_impact(e))
+            })
+            .run(BALL.state([1.0], [0.0]), 0.0..5.0)
+            .expect_err("a ball at rest");
+        let end = (2.0 / BALL.g).sqrt() * (1.0 + 2.0 * e / (1.0 - e));
+        match error.kind() {
+            RunErrorKind::EventsWithoutEnd { name, time } => {
+                assert_eq!(name, "height");
+                assert!((time - end).abs() < 1e-6, "{e}: {time} for {end}");
+            }
+            other => panic!("{other:?}"),
+        }
+        assert!(error.partial().last().q[0].abs() < 1e-9, "{e}");
+    }
+}
+
 /// x = cos t: pairs within one element and one sample, roots at nodes, backwards, all in order and with their directions.
 #[test]
 fn all_crossings_of_an_oscillator_are_met() {
@@ -181,6 +204,26 @@ fn simultaneous_events_are_all_met() {
         last.q[0].abs() < 1e-14 && last.q[1].abs() < 1e-14,
         "{last:?}"
     );
+    // What an impact stops without a force that presses it on slides along the wall.
+    for start in [1.0, 0.05, 3.7] {
+        let slide = Simulation::new(&Corner)
+            .step(0.3)
+            .on("right", Crossing::Falling, |event| {
+                Act::Restart(event.after_impact(0.0))
+            })
+            .run(
+                Corner.state([0.0, 0.0], [start, 0.1]),
+                0.0..1.0 / start + 5.0,
+            )
+            .expect("a run");
+        let last = slide.last();
+        assert_eq!(slide.events().len(), 1);
+        assert!((last.q[0] - 1.0).abs() < 1e-11, "{last:?}");
+        assert!(
+            (last.q[1] - 0.1 * last.t).abs() < 1e-11 * last.t,
+            "{last:?}"
+        );
+    }
 }
 
 /// A pendulum in Cartesian coordinates that hits a wall: the same as that of an angle, with multipliers of its rod that hold across.

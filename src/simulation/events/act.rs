@@ -8,6 +8,7 @@ use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
 pub use crate::motion::Event;
 use crate::simulation::kind::Simulated;
+use std::cell::Cell;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -77,6 +78,9 @@ impl<const N: usize, L: Length<N>> Occurrence<'_, N, L> {
     ///
     /// The impulse acts along the normal of the surface and those of the constraints of the model, which hold after it as before. With e = 1 the energy is kept where neither surface nor
     /// constraints move. NaN, with which the run ends, where g depends on velocities, or where the constraints leave no motion along its normal.
+    ///
+    /// Nothing holds a motion on the surface. Where e is zero, or so small that the way back is not seen, and forces press the motion on the surface, it has come to rest there, and the run ends with
+    /// [`RunErrorKind::EventsWithoutEnd`].
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -151,6 +155,8 @@ struct Knowing<'a, 'm, M, const N: usize, L: Length<N>> {
     value: &'a Value<'m, L::Vector>,
     /// A parameter that the model cannot have another value of, and by how much it is larger.
     larger: Option<(usize, f64)>,
+    /// How fast the surface was met, where the state after an impact on it was asked for; else zero.
+    impact: Cell<f64>,
 }
 
 impl<M, L, const N: usize> Knows<N, L> for Knowing<'_, '_, M, N, L>
@@ -224,6 +230,9 @@ where
         let Some(after) = after.filter(|_| least <= 1e-9 * rate(v).abs() + roundings) else {
             return unknown();
         };
+        if restitution >= 0.0 {
+            self.impact.set(rate(v).abs());
+        }
         L::state(q.clone(), self.model.momenta(*t, q, &after))
     }
 
@@ -282,6 +291,7 @@ pub(in crate::simulation) fn state_after<M: Model<N>, const N: usize>(
             event: &event,
             value,
             larger,
+            impact: Cell::new(0.0),
         },
     });
     match act {
@@ -292,25 +302,32 @@ pub(in crate::simulation) fn state_after<M: Model<N>, const N: usize>(
     }
 }
 
-/// What is to be done at an event.
+/// What is to be done at an event, and how fast its surface was met, where that is an impact; else zero.
 pub(super) fn act<M, L, const N: usize>(
     model: &M,
     (on, value): (&On<'_, N, L>, &Value<'_, L::Vector>),
     event: &Event<N, L>,
-) -> Act<N, L>
+) -> (Act<N, L>, f64)
 where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    (on.act)(&Occurrence {
+    let knowing = Knowing {
+        model,
         event,
-        model: &Knowing {
-            model,
-            event,
-            value,
-            larger: None,
-        },
-    })
+        value,
+        larger: None,
+        impact: Cell::new(0.0),
+    };
+    let act = (on.act)(&Occurrence {
+        event,
+        model: &knowing,
+    });
+    let impact = match act {
+        Act::Restart(_) => knowing.impact.get(),
+        _ => 0.0,
+    };
+    (act, impact)
 }
 
 /// With what a run goes on after an event.

@@ -205,7 +205,48 @@ where
             function,
             rises,
             is_idle: true,
+            impact: 0.0,
         });
+    }
+
+    /// Whether an impact has not been seen to throw the motion back.
+    pub(super) fn has_impacts(&self) -> bool {
+        let is_impact = |last: &LastCut| last.impact > 0.0;
+        self.seen.lasts.iter().flatten().any(is_impact)
+    }
+
+    /// Looks at what impacts have done, in an element that ends at `time`, with the values at its start and at its end. A motion that is seen beyond the surface first has come to rest on it: the way
+    /// back was too short to be seen, and forces press the motion through.
+    pub(super) fn check_impacts(
+        &mut self,
+        remaining: &Remaining,
+        [begin, end]: &[Vec<f64>; 2],
+        time: f64,
+    ) -> Result<(), RunErrorKind> {
+        /// What is left of a velocity that an impact has stopped may be rounding, relative to what it was: a motion without forces stays where it is.
+        const ROUNDING: f64 = 1e-9;
+        /// The way through a surface begins on it, relative to where it leads.
+        const ON_SURFACE: f64 = 1e-3;
+        for (function, last) in self.seen.lasts.iter_mut().enumerate() {
+            let Some(last) = last.as_mut().filter(|last| last.impact > 0.0) else {
+                continue;
+            };
+            let beyond = if last.rises { 1.0 } else { -1.0 };
+            let side = remaining.side(function);
+            if side == -beyond {
+                last.impact = 0.0;
+                continue;
+            }
+            let depth = beyond * end[function];
+            let least = ROUNDING * last.impact * (time - last.time).abs();
+            if side == beyond && depth > least && begin[function].abs() < ON_SURFACE * depth {
+                return Err(RunErrorKind::EventsWithoutEnd {
+                    name: self.watched[function].on.name.clone(),
+                    time: last.time,
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Of the values before an act, sides that are known are kept where it has left the values as they were, but for roundings. What it has moved is on a side that is found out anew, and a
