@@ -121,16 +121,16 @@ pub(super) fn crossings(
             });
             *side = -*side;
         };
-        // What is left of a zero at the start is rounding.
-        let rounding = if side == 0.0 {
+        // What is left of a zero at the start is rounding; what is no finite number there is none.
+        let rounding = if side == 0.0 && column[0].is_finite() {
             4.0 * column[0].abs()
         } else {
             0.0
         };
         // So is what roundings of the time leave of it, which in a short element is much.
         let rounded = (8.0 * resolution).max(1e-12);
-        let starts_off =
-            column[0].abs() > rounded * column.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        let finite = column.iter().filter(|value| value.is_finite());
+        let starts_off = column[0].abs() > rounded * finite.fold(0.0, |a: f64, b| a.max(b.abs()));
         for k in 0..times.len() {
             let here = column[k];
             let is_known = side != 0.0 || starts_off || here.abs() > rounding;
@@ -287,6 +287,17 @@ mod tests {
             "{}",
             bent.len()
         );
+    }
+
+    /// Of what is infinite or no number at the start, as 1/t at zero, the first side was never known, and its events were lost.
+    #[test]
+    fn values_that_are_not_finite_somewhere_hide_no_root() {
+        let inverse = taus(0.0, |tau| 1.0 / tau - 1.0 / 0.55);
+        assert!(is_near(&inverse, &[0.55]), "{inverse:?}");
+        let unknown = taus(0.0, |tau| if tau > 0.0 { 0.55 - tau } else { f64::NAN });
+        assert!(is_near(&unknown, &[0.55]), "{unknown:?}");
+        let pole = taus(0.0, |tau| (0.55 - tau) / (1.0 - tau).powi(2));
+        assert!(is_near(&pole, &[0.55]), "{pole:?}");
     }
 
     #[test]
