@@ -310,7 +310,7 @@ impl fmt::Display for RunErrorKind {
                     "the error is estimated at {estimate:.1e}, above the {asked:.1e} asked for"
                 )?;
                 match until {
-                    Some(time) => write!(f, "; it is met up to t = {time}"),
+                    Some(time) => write!(f, "; it is met up to t = {}", Short(*time)),
                     None => Ok(()),
                 }
             }
@@ -353,6 +353,7 @@ impl fmt::Display for RunErrorKind {
                 )
             }
             Self::EventsWithoutEnd { name, time } => {
+                let time = Short(*time);
                 write!(
                     f,
                     "the event `{name}` comes ever sooner and without end at t = {time}: let `Act::Stop` end the run, or `Act::Record` leave the motion alone, where it comes to rest"
@@ -388,10 +389,12 @@ impl fmt::Display for RunErrorKind {
                 parameter,
             } => write!(
                 f,
-                "the event `{event}` at t = {time} sets `{parameter}` to a value that depends on the state, which transition matrices leave out: take differences of `run`, or put a coordinate in its place whose momentum does not appear in the Hamiltonian"
+                "the event `{event}` at t = {} sets `{parameter}` to a value that depends on the state, which transition matrices leave out: take differences of `run`, or put a coordinate in its place whose momentum does not appear in the Hamiltonian",
+                Short(*time)
             ),
             Self::Input(error) => error.fmt(f),
             Self::Ended { time } => {
+                let time = Short(*time);
                 write!(f, "a step after t = {time} failed: the run has ended")
             }
             Self::KinksUnsupported { call } => write!(
@@ -399,6 +402,7 @@ impl fmt::Display for RunErrorKind {
                 "`{call}` does not cut steps at kinks; runs from start to end do"
             ),
             Self::NodeOrder { node, time } => {
+                let time = Short(*time);
                 write!(
                     f,
                     "node {node} at t = {time} does not lie beyond the one before it"
@@ -410,12 +414,14 @@ impl fmt::Display for RunErrorKind {
                 start,
                 end,
             } => {
+                let [first, last, start, end] = [first, last, start, end].map(|time| Short(*time));
                 write!(
                     f,
                     "the nodes go from {first} to {last}, but the span is {start}..{end}"
                 )
             }
             Self::NodeEnds { start, end, .. } => {
+                let (start, end) = (Short(*start), Short(*end));
                 write!(f, "there are no nodes in the span {start}..{end}")
             }
             Self::Start { coordinate, q, p } => {
@@ -426,6 +432,7 @@ impl fmt::Display for RunErrorKind {
                 )
             }
             Self::Inconsistent { time, residuals } => {
+                let time = Short(*time);
                 write!(f, "the start at t = {time} violates constraints:")?;
                 write_residuals(f, residuals)?;
                 write!(
@@ -435,6 +442,7 @@ impl fmt::Display for RunErrorKind {
             }
             Self::Unsupported { call, of } => write!(f, "`{call}` is not to be had of {of}"),
             Self::Impulse { time } => {
+                let time = Short(*time);
                 write!(
                     f,
                     "the impulse at t = {time} is not finite or lies outside the span"
@@ -483,7 +491,11 @@ impl<const N: usize, L: Length<N>> fmt::Display for RunError<N, L> {
         self.kind.fmt(f)?;
         match self.partial.states().last() {
             Some(node) if self.partial.states().len() > 1 => {
-                write!(f, "; the motion up to t = {} is in `partial()`", node.t)?;
+                write!(
+                    f,
+                    "; the motion up to t = {} is in `partial()`",
+                    Short(node.t)
+                )?;
             }
             _ => {}
         }

@@ -1,5 +1,6 @@
 //! What a run notices about itself.
 
+use crate::numbers::Short;
 use std::fmt;
 use tfe_runtime::Element;
 
@@ -91,9 +92,13 @@ impl fmt::Display for Warning {
                 exact,
             } => write!(
                 f,
-                "from t = {time} on, the step {step} lies in an unstable interval of `{element}` for the linearised model: \
-                 a step multiplies a mode by {radius:.6} that the model multiplies by {exact:.6}; take a shorter step, \
+                "from t = {} on, the step {} lies in an unstable interval of `{element}` for the linearised model: \
+                 a step multiplies a mode by {} that the model multiplies by {}; take a shorter step, \
                  or an element that is stable at every step, `{}` or `{}`",
+                Short(*time),
+                Short(*step),
+                factor(*radius),
+                factor(*exact),
                 Element::mixed(element.nodes()),
                 element.reduced(),
             ),
@@ -103,11 +108,13 @@ impl fmt::Display for Warning {
                 largest,
             } => write!(
                 f,
-                "the mass matrix at t = {time} has eigenvalues of both signs, {least:.3e} and {largest:.3e}: look for a wrong sign in the kinetic energy"
+                "the mass matrix at t = {} has eigenvalues of both signs, {least:.3e} and {largest:.3e}: look for a wrong sign in the kinetic energy",
+                Short(*time)
             ),
             Self::EnergyNotFinite { time } => write!(
                 f,
-                "the energy at t = {time} is not finite: the mass matrix is singular there, or the model has a singular point"
+                "the energy at t = {} is not finite: the mass matrix is singular there, or the model has a singular point",
+                Short(*time)
             ),
             Self::EnergyJump {
                 time,
@@ -117,7 +124,8 @@ impl fmt::Display for Warning {
             } => {
                 write!(
                     f,
-                    "the energy, which the model conserves, jumps from {before:.6e} to {after:.6e} at t = {time}"
+                    "the energy, which the model conserves, jumps from {before:.6e} to {after:.6e} at t = {}",
+                    Short(*time)
                 )?;
                 match count {
                     0 | 1 => {}
@@ -136,9 +144,76 @@ impl fmt::Display for Warning {
                 ..
             } => write!(
                 f,
-                "the step {step} at t = {time} does not resolve the motion: shorter steps end elsewhere by {distance:.2} of what the motion extends over; \
-                 take a shorter step or an element with more nodes"
+                "the step {} at t = {} does not resolve the motion: shorter steps end elsewhere by {} of what the motion extends over; \
+                 take a shorter step or an element with more nodes",
+                Short(*step),
+                Short(*time),
+                part(*distance)
             ),
         }
+    }
+}
+
+/// A factor of an amplitude, with the digits that tell it from one, or with an exponent where others would be rows of zeros or of digits.
+fn factor(value: f64) -> String {
+    let from_one = (value - 1.0).abs();
+    if (1e-12..1e-4).contains(&from_one) {
+        format!("{value:.9}")
+    } else if value == 0.0 || (1e-3..1e6).contains(&value) {
+        format!("{value:.6}")
+    } else {
+        format!("{value:.3e}")
+    }
+}
+
+/// A part of something, however many times larger it is.
+fn part(value: f64) -> String {
+    if value < 1e3 {
+        format!("{value:.2}")
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_told_as_short_as_they_can_be_told_apart() {
+        let unstable = |time, radius, exact| {
+            let warning = Warning::UnstableStep {
+                time,
+                step: 0.5,
+                element: Element::primal(3),
+                radius,
+                exact,
+            };
+            warning.to_string()
+        };
+        let usual = unstable(2.5, 1.25, 1.0);
+        assert!(usual.starts_with("from t = 2.5 on, the step 0.5 lies"));
+        let factors = "multiplies a mode by 1.250000 that the model multiplies by 1.000000;";
+        assert!(usual.contains(factors), "{usual}");
+        let slow = unstable(0.0, 1.0 + 2e-7, 1.0);
+        let factors = "multiplies a mode by 1.000000200 that the model multiplies by 1.000000;";
+        assert!(slow.contains(factors), "{slow}");
+        let fast = unstable(1e300, 1e30, 1e-30);
+        assert!(fast.starts_with("from t = 1e300 on"), "{fast}");
+        let factors = "multiplies a mode by 1.000e30 that the model multiplies by 1.000e-30;";
+        assert!(fast.contains(factors), "{fast}");
+        let unresolved = |distance| {
+            let warning = Warning::Unresolved {
+                time: 1e-9,
+                step: 0.1,
+                distance,
+                count: 1,
+            };
+            warning.to_string()
+        };
+        assert!(unresolved(0.051).contains("at t = 1e-9 does not"));
+        assert!(unresolved(0.051).contains("elsewhere by 0.05 of"));
+        assert!(unresolved(1e40).contains("elsewhere by 1.0e40 of"));
+        assert!(unresolved(f64::INFINITY).contains("elsewhere by inf of"));
     }
 }
