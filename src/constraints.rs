@@ -131,8 +131,9 @@ impl<Name: fmt::Display> Reactions<Name> {
 
     /// All reactions at one recorded node.
     pub fn row(&self, node: usize) -> Option<&[f64]> {
-        self.values
-            .get(node * self.names.len()..(node + 1) * self.names.len())
+        let columns = self.names.len();
+        let start = node.checked_mul(columns)?;
+        self.values.get(start..start.checked_add(columns)?)
     }
 }
 

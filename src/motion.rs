@@ -101,7 +101,8 @@ impl Outputs {
     /// All columns at one recorded node, in the order of [`names`](Self::names).
     pub fn row(&self, node: usize) -> Option<&[f64]> {
         let columns = self.names.len();
-        self.values.get(node * columns..(node + 1) * columns)
+        let start = node.checked_mul(columns)?;
+        self.values.get(start..start.checked_add(columns)?)
     }
 }
 

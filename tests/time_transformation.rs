@@ -248,6 +248,8 @@ fn differences(c: f64) -> (f64, f64) {
     let outputs = motion.outputs().row(node).expect("a row for each node");
     assert_eq!(outputs[0], a * (w * end).cos());
     assert_eq!(outputs[2], last.p[0]);
+    let none = [node + 1, usize::MAX].map(|node| motion.outputs().row(node));
+    assert_eq!(none, [None; 2]);
     (difference, balance)
 }
 
