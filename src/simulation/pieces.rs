@@ -165,6 +165,7 @@ where
                 }
                 return Ok(left(observer.reached(stepper, next, state)));
             };
+            let passed = cut.length_from(from, h);
             let Cut {
                 t: time,
                 at,
@@ -197,7 +198,7 @@ where
             observer.at_event(stepper, &self.model, Side::After, (time, &after));
             *state = after;
             if time != next {
-                length -= time - from;
+                length -= passed;
             } else if !self.events.has_due() {
                 return Ok(left(observer.reached(stepper, next, state)));
             }

@@ -253,6 +253,32 @@ fn impacts_at_late_times_happen_once() {
     }
 }
 
+/// Of times far from zero fewer digits are known than of steps: behind impacts the motion is that of a run from zero all the same, also backwards.
+#[test]
+fn motions_behind_late_impacts_have_the_digits_of_the_step() {
+    // Times of nodes, up to the end, are exact.
+    let step = 1.0 / 128.0;
+    for sign in [1.0, -1.0] {
+        let last = |start: f64| {
+            let run = Simulation::new(&BALL).step(step);
+            let run = run.on("height", Crossing::Falling, |event| {
+                Act::Restart(event.after_impact(0.9))
+            });
+            let run = run.run(BALL.state([1.0], [0.0]), start..start + 3.0 * sign);
+            let run = run.expect("a run");
+            assert_eq!(run.events().len(), 4, "{start}");
+            (run.last().q[0], run.last().v[0])
+        };
+        let (q, v) = last(0.0);
+        for start in [1e6, 1e9, -1e9] {
+            let (late_q, late_v) = last(start);
+            // Of four impacts each is met to 1e-12 of a step.
+            assert!((late_q - q).abs() < 1e-11, "{start}: {late_q} for {q}");
+            assert!((late_v - v).abs() < 1e-11, "{start}: {late_v} for {v}");
+        }
+    }
+}
+
 /// A function that the model does not declare, beside the output that is the same.
 #[test]
 fn functions_are_events() {

@@ -1,7 +1,7 @@
 //! The time of an event: an element that ends there is looked for (T-122).
 
 use super::search::Root;
-use super::{Events, Passage};
+use super::{Cut, Events, Passage};
 use crate::length::{Length, Polynomial};
 use crate::simulation::acting;
 use crate::simulation::kind::Simulated;
@@ -18,6 +18,21 @@ pub(super) struct Met<const N: usize, L: Length<N>> {
     /// Their derivatives by the time, on the polynomial.
     pub(super) slopes: Vec<f64>,
     pub(super) inside: Option<L::Polynomial>,
+}
+
+/// What lengths may be off by, relative to the step: far from zero roundings of the time are more.
+const DIGITS: f64 = 1e-12;
+
+impl<M, const N: usize, L: Length<N>> Cut<'_, M, N, L> {
+    /// How far it is from where the cut element begins: the difference of times, unless these have not the digits of the step `h`.
+    pub(in crate::simulation) fn length_from(&self, from: f64, h: f64) -> f64 {
+        let (between, length) = (self.t - from, self.place.length);
+        if self.place.inside && (length - between).abs() > DIGITS * h.abs() {
+            length
+        } else {
+            between
+        }
+    }
 }
 
 impl<'m, M, const N: usize, L> Events<'m, M, N, L>
@@ -66,6 +81,7 @@ where
         let Passage {
             t, begin, h, dense, ..
         } = *arc;
+        let enough = (0.25 * resolution).min(DIGITS * self.step.abs());
         let mut length = root.tau * h;
         let mut probe = match self.probe.take() {
             Some(probe) => probe,
@@ -104,7 +120,7 @@ where
             let most = (OVERSHOOT * change.abs()).max(resolution);
             if root.is_left_at_once(along * h.signum())
                 || !(change.abs() < last && beyond <= most)
-                || change.abs() <= 0.25 * resolution
+                || change.abs() <= enough
             {
                 break;
             }
