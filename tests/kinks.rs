@@ -498,6 +498,30 @@ fn ensembles_are_cut_at_kinks() {
     assert_eq!((ends.nodes().count(), ends.failures().count()), (0, 1));
 }
 
+/// Steps have their length far from zero, too, where differences of times have it to some digits: those of 0.01 were short by 1e-8 at 1e9, all of them.
+#[test]
+fn late_steps_beside_kinks_keep_their_length() {
+    let end = |start: f64, h: f64| {
+        let run = Simulation::new(&BOUNCE).step(h).at_kinks(true);
+        let start = start..start + 50.0 * h;
+        let run = run.run(BOUNCE.state([5.0], [0.0]), start).expect("a run");
+        (run.last().q[0], run.last().v[0])
+    };
+    for start in [1e6, 1e9, -1e9] {
+        // Falls from 5, by 1.25 m, and far from the spring; back in time likewise.
+        let (q, v) = end(start, 0.01);
+        assert!(
+            (q - 3.75).abs() < 1e-12 && (v + 5.0).abs() < 1e-12,
+            "{start}: {q} {v}"
+        );
+        let (q, v) = end(start, -0.01);
+        assert!(
+            (q - 3.75).abs() < 1e-12 && (v - 5.0).abs() < 1e-12,
+            "{start}: {q} {v}"
+        );
+    }
+}
+
 /// What cannot be cut there says so.
 #[test]
 fn what_cannot_be_cut_at_kinks_is_refused() {

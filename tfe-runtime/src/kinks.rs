@@ -32,6 +32,9 @@ const SHORT: f64 = 0.02;
 /// An arc shorter than that, relative to the step, only gets to the other side of a root nearby.
 const SHORTEST: f64 = 1e-6;
 
+/// What lengths of arcs may be off by, relative to the step: far from zero differences of times are off by more.
+const DIGITS: f64 = 1e-12;
+
 /// How far behind an arc its polynomial is taken for the motion, relative to the arc.
 const BEYOND: f64 = 1e-3;
 
@@ -133,7 +136,8 @@ pub(crate) fn in_arcs<S: Kinked>(
     kicks: &[S::Kick],
 ) -> Result<(), StepError> {
     let end = t + h;
-    let (mut now, mut kicks) = (t, kicks.to_vec());
+    // How much of the step is left, also where roundings of the times are more than its digits.
+    let (mut now, mut left, mut kicks) = (t, h, kicks.to_vec());
     let (mut begins_at_root, mut short) = (false, 0);
     let (mut effort, mut crossings) = (Effort::default(), 0);
     // The functions that have changed their signs.
@@ -142,7 +146,8 @@ pub(crate) fn in_arcs<S: Kinked>(
         // Friction ends with a velocity of zero, relative to which all increments are large.
         stepper.trust(begins_at_root);
         let (from, kicked) = ((now, begins_at_root), &kicks);
-        let arc = arc(stepper, from, (end, h), state, kicked, &mut effort)?;
+        let rest = rest_of(end - now, left, h);
+        let arc = arc(stepper, from, (end, rest, h), state, kicked, &mut effort)?;
         let (Arc::Smooth { length } | Arc::Crossing { length, .. }) = arc;
         match arc {
             Arc::Crossing { switch, .. } if !seen.contains(&switch) => seen.push(switch),
@@ -151,7 +156,7 @@ pub(crate) fn in_arcs<S: Kinked>(
         if short > MAX_SHORT {
             return Err(StepError::Slides);
         }
-        let is_last = length == end - now || now + length == end;
+        let is_last = length == rest || now + length == end;
         let until = if is_last { end } else { now + length };
         let (later, done) =
             (kicks.into_iter()).partition(|kick| is_later(kick, until, h) && !is_last);
@@ -159,7 +164,7 @@ pub(crate) fn in_arcs<S: Kinked>(
             return Ok(());
         }
         stepper.passed(now, length, done);
-        (now, kicks) = (until, later);
+        (now, left, kicks) = (until, left - length, later);
         begins_at_root = matches!(arc, Arc::Crossing { .. });
         if let Arc::Crossing { switch, margin, .. } = arc {
             stepper.crossed();
@@ -176,7 +181,7 @@ pub(crate) fn in_arcs<S: Kinked>(
                 let crossed = stepper.whole(now, over, state, &[]);
                 crossed.map_err(|_| StepError::Slides)?;
                 stepper.passed(now, over, Vec::new());
-                now += over;
+                (now, left) = (now + over, left - over);
             }
         }
         if is_last {
@@ -188,6 +193,17 @@ pub(crate) fn in_arcs<S: Kinked>(
         }
     }
     Err(StepError::TooManyKinks)
+}
+
+/// The rest of a step h, of which so much is `left`: the difference `between` the times, where it has the digits of the step.
+fn rest_of(between: f64, left: f64, h: f64) -> f64 {
+    let is_rounded = (left - between).abs() > DIGITS * h.abs();
+    let is_ahead = if h > 0.0 { left > 0.0 } else { left < 0.0 };
+    if is_rounded && is_ahead {
+        left
+    } else {
+        between
+    }
 }
 
 /// Whether something acts after a time.
@@ -235,12 +251,12 @@ impl Landing {
 fn arc<S: Kinked>(
     stepper: &mut S,
     (now, begins_at_root): (f64, bool),
-    (end, h): (f64, f64),
+    (end, rest, h): (f64, f64, f64),
     state: &mut S::State,
     kicks: &[S::Kick],
     effort: &mut Effort,
 ) -> Result<Arc, StepError> {
-    let rest = (end - now).abs();
+    let rest = rest.abs();
     let resolution = 4.0 * f64::EPSILON * now.abs().max(end.abs()).max(rest);
     let (points, has_ends) = stepper.points();
     let samples = (2 * points).clamp(8, 24);
@@ -393,7 +409,9 @@ fn arc<S: Kinked>(
     *state = start;
     stepper.forget();
     stepper.whole(now, rest.copysign(h), state, kicks)?;
-    Ok(Arc::Smooth { length: end - now })
+    Ok(Arc::Smooth {
+        length: rest.copysign(h),
+    })
 }
 
 /// Whether the motion comes back at once to where it has crossed (Filippov): behind the surface the function falls.
