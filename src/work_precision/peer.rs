@@ -4,6 +4,7 @@ use super::measure::Best;
 use super::point::Cost;
 use super::reference::Known;
 use super::subject::PhasePoint;
+use crate::numbers::larger;
 use std::error::Error;
 use std::time::Duration;
 
@@ -79,12 +80,7 @@ impl PeerPoint {
 impl PeerMeasured {
     /// The larger of the errors of coordinates and momenta.
     pub fn error(&self) -> f64 {
-        // `f64::max` would drop a NaN.
-        if self.error_p <= self.error_q {
-            self.error_q
-        } else {
-            self.error_p
-        }
+        larger(self.error_q, self.error_p)
     }
 
     /// What it cost; `None` where peers do not count it.

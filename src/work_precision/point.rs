@@ -1,6 +1,7 @@
 //! One run: what it cost, and how far off it was.
 
 use crate::error::RunErrorKind;
+use crate::numbers::larger;
 use tfe_runtime::{Element, Solve, Statistics};
 
 /// What a run is charged with.
@@ -76,12 +77,7 @@ pub struct Measured {
 impl Measured {
     /// The larger of the errors of coordinates and momenta at the end.
     pub fn error(&self) -> f64 {
-        // `f64::max` would drop a NaN.
-        if self.error_p <= self.error_q {
-            self.error_q
-        } else {
-            self.error_p
-        }
+        larger(self.error_q, self.error_p)
     }
 
     /// What it cost.
@@ -112,5 +108,32 @@ impl Point {
     /// What the run cost, if it reached its end.
     pub fn cost(&self, cost: Cost) -> Option<f64> {
         self.measured().map(|measured| measured.cost(cost))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_that_is_no_number_is_not_dropped() {
+        let error = |error_q: f64, error_p: f64| {
+            let measured = Measured {
+                error_q,
+                error_p,
+                max_error_q: error_q,
+                max_error_p: error_p,
+                energy_error: 0.0,
+                constraint_position: 0.0,
+                constraint_velocity: 0.0,
+                seconds: 1.0,
+                repetitions: 1,
+                statistics: Statistics::NONE,
+                at_reference_floor: false,
+            };
+            measured.error()
+        };
+        assert_eq!([error(1.0, 2.0), error(2.0, 1.0)], [2.0, 2.0]);
+        assert!(error(f64::NAN, 1.0).is_nan() && error(1.0, f64::NAN).is_nan());
     }
 }

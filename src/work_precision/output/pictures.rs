@@ -1,6 +1,7 @@
 //! Charts and sections of pages.
 
 use crate::charts::{Axis, Chart, ChartError, Scale, Section, Style};
+use crate::numbers::larger;
 use crate::work_precision::peer::{PeerMeasured, PeerPoint};
 use crate::work_precision::point::Measured;
 use crate::work_precision::{Curve, Measurements, Point};
@@ -19,12 +20,13 @@ impl Measurements {
             .y(self.errors(logarithmic("relative error at the end")))
             .size(900, 560);
         for curve in &self.curves {
-            let place = |one: &Measured| (one.cost(self.cost), one.error().max(LEAST));
+            let place = |one: &Measured| (one.cost(self.cost), larger(one.error(), LEAST));
             let points = curve.measured().map(|(_, one)| place(one));
             chart = chart.series(self.name(curve), Style::LineWithMarkers, points);
         }
         for peer in &self.peers {
-            let place = |one: &PeerMeasured| Some((one.cost(self.cost)?, one.error().max(LEAST)));
+            let place =
+                |one: &PeerMeasured| Some((one.cost(self.cost)?, larger(one.error(), LEAST)));
             let points = peer.points.iter().filter_map(PeerPoint::measured);
             let points: Vec<_> = points.filter_map(place).collect();
             if !points.is_empty() {
@@ -157,11 +159,12 @@ impl Measurements {
     fn below_reference(&self) -> Vec<(f64, f64)> {
         let ours = self.points().filter_map(Point::measured);
         let ours = ours.filter(|one| one.at_reference_floor);
-        let ours = ours.map(|one| (one.cost(self.cost), one.error().max(LEAST)));
+        let ours = ours.map(|one| (one.cost(self.cost), larger(one.error(), LEAST)));
         let peers = self.peers.iter().flat_map(|peer| &peer.points);
         let peers = peers.filter_map(PeerPoint::measured);
         let peers = peers.filter(|one| one.at_reference_floor);
-        let peers = peers.filter_map(|one| Some((one.cost(self.cost)?, one.error().max(LEAST))));
+        let peers =
+            peers.filter_map(|one| Some((one.cost(self.cost)?, larger(one.error(), LEAST))));
         ours.chain(peers).collect()
     }
 
