@@ -333,6 +333,7 @@ fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut dyn Runner) 
 mod tests {
     use super::*;
     use crate::accuracy::trace::Trace;
+    use tfe_runtime::StepError;
 
     /// Runs whose errors are known.
     struct Law<F> {
@@ -516,6 +517,56 @@ mod tests {
         let by_tolerance = |way: &Way<'_>, step: f64| 1e4 * way.tolerance * noise(step);
         let (found, error) = found(1e-6, true, by_tolerance).expect("runs");
         assert!(found.is_met && error.abs() <= 1e-6, "{error}");
+    }
+
+    /// Runs that fail whatever the step, and are refused where the time does not resolve it.
+    struct Failing;
+
+    impl Runner for Failing {
+        fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
+            let (time, step) = (1.0, way.step);
+            Err(Failed::from(if step < 1e-14 {
+                let least = 1e-14;
+                RunErrorKind::StepUnresolved { time, step, least }
+            } else {
+                RunErrorKind::Solve {
+                    element: 0,
+                    time,
+                    step,
+                    source: StepError::NonFinite,
+                }
+            }))
+        }
+
+        fn run_beside(
+            &mut self,
+            way: &Way<'_>,
+            _: &Way<'_>,
+            _: &mut Judge<'_>,
+        ) -> Result<RanBeside, Failed> {
+            Err(self.run(way).expect_err("all runs fail"))
+        }
+    }
+
+    /// The reason is that of the steps which the time resolves.
+    #[test]
+    fn what_fails_with_every_step_says_why() {
+        let asked = Asked {
+            accuracy: 1e-6,
+            span: 1.0..11.0,
+            breaks: Vec::new(),
+            element: None,
+            longest: None,
+            may_iterate: true,
+            solve: Solve::Auto,
+            graded: None,
+            in_pairs: false,
+        };
+        let kind = search(&asked, &mut Failing, None).expect_err("all runs fail");
+        assert!(
+            matches!(&kind, RunErrorKind::Solve { source, .. } if *source == StepError::NonFinite),
+            "{kind}"
+        );
     }
 
     #[test]

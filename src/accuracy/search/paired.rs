@@ -226,6 +226,7 @@ pub(super) fn climb(
         };
         let ran = match ran {
             Err(failed) if failed.is_final_after(failure.as_ref()) => return Err(failed.kind),
+            Err(failed) if failure.is_some() && failed.is_unresolved() => break,
             Err(failed) => {
                 attempts.push(told);
                 failure = Some(failed.kind);

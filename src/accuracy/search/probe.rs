@@ -67,6 +67,7 @@ pub(super) fn probe(
             }
             Ok(apart) if apart > 1.0 => 4.0,
             Ok(_) => 2.0,
+            Err(failed) if failure.is_some() && failed.is_unresolved() => break,
             Err(failed) => {
                 failure = Some(failed.kind);
                 3.0

@@ -116,6 +116,14 @@ impl Failed {
         let of_input = |kind: &RunErrorKind| matches!(kind, RunErrorKind::Input(_));
         self.is_final || of_input(&self.kind) && before.is_some_and(of_input)
     }
+
+    /// Whether the time has not the digits for the step: that says nothing of why longer ones have failed.
+    pub(super) fn is_unresolved(&self) -> bool {
+        matches!(
+            self.kind,
+            RunErrorKind::StepUnresolved { .. } | RunErrorKind::TooManySteps { .. }
+        )
+    }
 }
 
 impl From<RunErrorKind> for Failed {
