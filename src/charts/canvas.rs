@@ -20,6 +20,27 @@ pub(super) const TEXT: f64 = 12.0;
 /// Width of a character of the usual size, in pixels: rather too much.
 pub(super) const CHARACTER: f64 = 7.0;
 
+/// How many characters of the usual width a text is wide.
+pub(super) fn characters(text: &str) -> usize {
+    text.chars().map(characters_of).sum()
+}
+
+/// Two of East Asian scripts and of pictures, one of all others.
+pub(super) fn characters_of(c: char) -> usize {
+    match c {
+        '\u{1100}'..='\u{115F}'
+        | '\u{2E80}'..='\u{A4CF}'
+        | '\u{AC00}'..='\u{D7A3}'
+        | '\u{F900}'..='\u{FAFF}'
+        | '\u{FE30}'..='\u{FE6F}'
+        | '\u{FF00}'..='\u{FF60}'
+        | '\u{FFE0}'..='\u{FFE6}'
+        | '\u{1F300}'..='\u{1FAFF}'
+        | '\u{20000}'..='\u{3FFFD}' => 2,
+        _ => 1,
+    }
+}
+
 /// The least and the largest side of a picture, in pixels.
 const SIDES: (u32, u32) = (240, 8000);
 

@@ -4,7 +4,7 @@ mod image;
 
 use super::axis::Axis;
 use super::axis::Extent;
-use super::canvas::{self, Anchor, CHARACTER, Canvas, Frame, TEXT, picture, sides};
+use super::canvas::{self, Anchor, CHARACTER, Canvas, Frame, TEXT, characters, picture, sides};
 use super::clip::Point;
 use super::colours::Colour;
 use super::error::ChartError;
@@ -400,7 +400,7 @@ fn in_lines(entries: &[Entry], width: f64) -> Vec<Vec<Placed>> {
     let mut lines: Vec<Vec<Placed>> = Vec::new();
     let mut used = f64::INFINITY;
     for entry in entries {
-        let own = AROUND_NAME + CHARACTER * entry.0.chars().count() as f64;
+        let own = AROUND_NAME + CHARACTER * characters(&entry.0) as f64;
         if used + own > width {
             lines.push(Vec::new());
             used = 0.0;

@@ -1,7 +1,7 @@
 //! Line charts.
 
 use super::axis::Axis;
-use super::canvas::{Anchor, CHARACTER, Canvas, Shape, TEXT, picture, sides};
+use super::canvas::{Anchor, CHARACTER, Canvas, Shape, TEXT, characters, picture, sides};
 use super::clip::Point;
 use super::colours::Colour;
 use super::error::ChartError;
@@ -262,7 +262,7 @@ impl Legend {
 
     /// Beside a frame of this height.
     fn width(&self, height: f64) -> f64 {
-        let long = |text: &str| CHARACTER * text.chars().count() as f64;
+        let long = |text: &str| CHARACTER * characters(text) as f64;
         let entries = self.entries.iter().map(|(name, _)| KEY + long(name));
         let Some(entries) = entries.reduce(f64::max) else {
             return 24.0;

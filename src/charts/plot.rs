@@ -1,7 +1,7 @@
 //! What every picture with two axes has: title, frame, ticks, labels, a legend.
 
 use super::axis::{Extent, Tick};
-use super::canvas::{Anchor, CHARACTER, Canvas, Frame, Shape, TEXT};
+use super::canvas::{Anchor, CHARACTER, Canvas, Frame, Shape, TEXT, characters, characters_of};
 use super::clip::{self, Point};
 use super::colours::Colour;
 use super::error::ChartError;
@@ -183,7 +183,7 @@ fn fitted(text: &str, usual: f64, room: f64) -> (String, f64) {
     let width = CHARACTER / TEXT;
     // Rounding must not cut what just fits.
     let room = room * (1.0 + 1e-9);
-    let size = (room / (width * text.chars().count() as f64)).clamp(0.75 * usual, usual);
+    let size = (room / (width * characters(text) as f64)).clamp(0.75 * usual, usual);
     (shortened(text, (room / (width * size)) as usize), size)
 }
 
@@ -263,12 +263,20 @@ pub(super) fn longest(ticks: &[Tick]) -> usize {
     ticks.iter().map(length).max().unwrap_or(0)
 }
 
-/// A text cut to so many characters.
+/// A text cut to so many characters of the usual width.
 pub(super) fn shortened(text: &str, most: usize) -> String {
-    if text.chars().count() <= most {
+    if characters(text) <= most {
         return text.to_owned();
     }
-    let mut short: String = text.chars().take(most.saturating_sub(1)).collect();
+    let mut left = most.saturating_sub(1);
+    let mut short = String::new();
+    for c in text.chars() {
+        let Some(rest) = left.checked_sub(characters_of(c)) else {
+            break;
+        };
+        left = rest;
+        short.push(c);
+    }
     short.push('…');
     short
 }

@@ -205,6 +205,31 @@ fn long_titles_and_labels_end_inside_the_picture() {
     assert!((120.0..159.0).contains(&smaller), "{smaller}");
 }
 
+/// Characters as wide as they are high: 60 of them are wider than the picture, and a legend of 40 than its third.
+#[test]
+fn wide_characters_take_their_room() {
+    let names = ["振".repeat(60), "動".repeat(40)];
+    let chart = Chart::new(names[0].as_str()).line(names[1].as_str(), [(0.0, 0.0), (1.0, 1.0)]);
+    let svg = chart.to_svg().unwrap();
+    let document = Document::parse(&svg).unwrap();
+    let mut cut = 0;
+    for node in document.descendants() {
+        let Some(text) = node.text().filter(|_| node.tag_name().name() == "text") else {
+            continue;
+        };
+        let text = text.trim();
+        if !text.ends_with('…') {
+            continue;
+        }
+        let number = |name: &str| -> f64 { node.attribute(name).unwrap().parse().unwrap() };
+        let end = number("x") + number("font-size") * text.chars().count() as f64;
+        assert!(end <= 7200.0, "{text}: {end}");
+        assert!(text.chars().count() > 10, "{text}");
+        cut += 1;
+    }
+    assert_eq!(cut, 2);
+}
+
 #[test]
 fn curves_that_end_far_away_keep_their_slope() {
     let unit = || Axis::new("").range(0.0..1.0);
