@@ -6,7 +6,7 @@ use crate::lower::lower;
 use crate::model::declared::Declared;
 use crate::syntax::ast::{ExprKind, Item, Spanned};
 use crate::syntax::context::{Context, FieldKind};
-use crate::syntax::parse::{first_word, parse_item, split_arguments};
+use crate::syntax::parse::{first_word, missing_commas, parse_item, split_arguments};
 use crate::vocabulary::Argument;
 
 /// Reads a whole attribute: splits, parses, checks, lowers.
@@ -59,6 +59,7 @@ fn parse(text: &str, bag: &mut Bag) -> Arguments {
         whole,
         ..Arguments::default()
     };
+    missing_commas(text, bag);
     for range in split_arguments(text) {
         let argument = &text[range.clone()];
         match parse_item(argument, range.start, bag) {

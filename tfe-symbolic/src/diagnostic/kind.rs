@@ -36,6 +36,11 @@ kinds! {
         /// What stands there.
         found: String,
     },
+    /// An argument that follows another one without a comma, or behind a semicolon.
+    MissingComma {
+        /// What stands there: the first word of the argument, or the semicolon.
+        found: String,
+    },
     /// `2x`, `2(x)`, `x y`
     MissingOperator {
         /// What stands left of the gap.

@@ -8,6 +8,7 @@ impl Kind {
     /// The remedy, where there is one to name.
     pub fn help(&self) -> Option<String> {
         Some(match self {
+            Self::MissingComma { .. } => "arguments are separated by commas".into(),
             Self::MissingOperator { left, right } => format!("write `{left}*{right}`"),
             Self::DoubleStar => "write `^` for a power".into(),
             Self::InclusiveRange => "write `a..b+1`".into(),

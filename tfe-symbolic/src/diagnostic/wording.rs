@@ -8,6 +8,7 @@ impl Kind {
     pub fn message(&self) -> String {
         match self {
             Self::Expected { wanted, found } => format!("expected {wanted}, found {found}"),
+            Self::MissingComma { found } => format!("expected a comma, found `{found}`"),
             Self::MissingOperator { left, right } => {
                 format!("missing operator between `{left}` and `{right}`")
             }

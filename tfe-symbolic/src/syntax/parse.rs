@@ -5,9 +5,9 @@
 
 mod expectation;
 mod limits;
+mod separators;
 mod slips;
 
-use std::ops::Range as Bytes;
 use std::sync::LazyLock;
 
 use pest::Parser as _;
@@ -25,6 +25,8 @@ use crate::vocabulary::{Argument, is_function};
 use expectation::{found_at, wanted};
 use limits::within_limits;
 pub use limits::{MAX_NESTING, MAX_OPERATORS};
+pub(crate) use separators::missing_commas;
+pub use separators::split_arguments;
 use slips::slip;
 
 static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
@@ -37,30 +39,6 @@ static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
         .op(Op::infix(Rule::power, Assoc::Right) | Op::infix(Rule::double_star, Assoc::Right))
         .op(Op::postfix(Rule::index))
 });
-
-/// Splits the text of a whole attribute at its top-level commas.
-///
-/// A trailing comma adds no argument. The ranges are not trimmed.
-pub fn split_arguments(text: &str) -> Vec<Bytes<usize>> {
-    let mut ranges = Vec::new();
-    let mut depth = 0usize;
-    let mut start = 0;
-    for (at, letter) in text.char_indices() {
-        match letter {
-            '(' | '[' | '{' => depth += 1,
-            ')' | ']' | '}' => depth = depth.saturating_sub(1),
-            ',' if depth == 0 => {
-                ranges.push(start..at);
-                start = at + 1;
-            }
-            _ => {}
-        }
-    }
-    if !text[start..].trim().is_empty() {
-        ranges.push(start..text.len());
-    }
-    ranges
-}
 
 /// Parses one argument of the attribute.
 ///
