@@ -28,10 +28,12 @@ impl Kind {
             Self::FieldAccess { object, field } => format!(
                 "formulas use the fields of the struct under the attribute: declare `{object}_{field}: f64`"
             ),
+            Self::MethodCall { object, method } if is_power(method) => {
+                format!("write `^` for a power, as in `{object}^2`")
+            }
             Self::MethodCall { object, method } => match arity(method) {
-                None => format!("write `{object}^n` for a power"),
-                Some(2) => format!("write `{method}({object}, …)`"),
-                Some(_) => format!("write `{method}({object})`"),
+                2 => format!("write `{method}({object}, …)`"),
+                _ => format!("write `{method}({object})`"),
             },
             Self::Bars => {
                 "write `abs(x)` for an absolute value, and the formula itself instead of a closure".into()
@@ -285,10 +287,19 @@ impl Kind {
             Self::MasslessCoordinate { name, .. } => {
                 format!("freeze `{name}` too, or truncate about another point")
             }
+            Self::UnknownFunction {
+                nearest: None,
+                name,
+            } => unknown_function(name),
             Self::NotAFunction { name } => format!("write `{name}*(…)` for a product"),
             Self::VelocityName { stem, .. } => format!("write `dot({stem})`"),
             Self::FunctionAsValue { name } => format!("write `{name}(…)`"),
             Self::UsedBeforeLet { .. } => "move the `let` up".into(),
+            Self::UnsupportedField { field_type, .. } if is_array_of_numbers(field_type) => {
+                "write its length as a number, or as a const parameter of the struct: the value of a \
+                 constant is not known here"
+                    .into()
+            }
             Self::UnsupportedField { .. } => {
                 "formulas use fields of type `f64`, `[f64; N]`, `Vec<f64>` and `usize`".into()
             }
@@ -334,6 +345,9 @@ impl Kind {
             Self::SolverOfFamily { .. } => {
                 "give the coordinates literal lengths, or use `Simulation`".into()
             }
+            Self::Expected { found, .. } if found == "`\"`" => {
+                "formulas stand without quotes, as in `lagrangian = m/2*dot(x)^2`".into()
+            }
             Self::Expected { .. }
             | Self::NumberTooLarge { .. }
             | Self::RepeatedArgument { .. }
@@ -341,7 +355,6 @@ impl Kind {
             | Self::LengthNotSimple
             | Self::TooManyCoordinates { .. }
             | Self::ForceTarget { .. }
-            | Self::UnknownFunction { .. }
             | Self::WrongArity { .. }
             | Self::NoSuchElement { .. }
             | Self::DivisionByZero
@@ -357,12 +370,36 @@ impl Kind {
     }
 }
 
-/// How many arguments a function has; nothing of methods that are no functions here.
-fn arity(name: &str) -> Option<usize> {
+/// How many arguments a function has.
+fn arity(name: &str) -> usize {
     let mut special = vocabulary::SPECIAL_FUNCTIONS.iter();
     let special = special.find(|(special, _)| *special == name);
     let elementary = Function::parse(name).map(Function::arity);
-    elementary.or(special.map(|(_, arity)| *arity))
+    elementary.or(special.map(|(_, arity)| *arity)).unwrap_or(1)
+}
+
+/// What stands in the language for a function of other languages; else what functions there are.
+fn unknown_function(name: &str) -> String {
+    match name {
+        name if is_power(name) => "write `^` for a power, as in `x^2`".into(),
+        "log" => "the natural logarithm is `ln`".into(),
+        "log10" => "write `ln(x)/ln(10)`".into(),
+        _ => {
+            let names: Vec<&str> = vocabulary::function_names().collect();
+            format!("the functions are {}", backticked(&names))
+        }
+    }
+}
+
+/// Whether other languages have powers by a function, or a method, of this name.
+fn is_power(name: &str) -> bool {
+    matches!(name, "pow" | "powi" | "powf")
+}
+
+/// Whether the type is `[f64; …]`, with a length that is neither a number nor a const parameter.
+fn is_array_of_numbers(field_type: &str) -> bool {
+    let elements = field_type.trim_start().strip_prefix('[');
+    elements.is_some_and(|elements| elements.trim_start().starts_with("f64"))
 }
 
 /// A pass as it may be written.
@@ -383,5 +420,25 @@ fn backticked(names: &[&str]) -> String {
         None => String::new(),
         Some(last) if names.is_empty() => last,
         Some(last) => format!("{} and {last}", names.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrays_whose_length_is_a_constant_have_a_remedy_of_their_own() {
+        let help = |field_type: &str| {
+            let (name, field_type) = ("k".to_owned(), field_type.to_owned());
+            let kind = Kind::UnsupportedField { name, field_type };
+            kind.help().unwrap_or_default()
+        };
+        for array in ["[f64; SPRINGS]", "[f64 ; 2 + 1]"] {
+            assert!(help(array).contains("const parameter"), "{array}");
+        }
+        for other in ["String", "f32", "[f32; 3]", "[[f64; 3]; 3]"] {
+            assert!(!help(other).contains("const parameter"), "{other}");
+        }
     }
 }

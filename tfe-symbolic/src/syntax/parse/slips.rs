@@ -5,9 +5,6 @@ use std::ops::Range as Bytes;
 use crate::diagnostic::Kind;
 use crate::vocabulary::is_function;
 
-/// The methods of Rust's numbers for what is an operator here.
-const POWERS: [&str; 2] = ["powi", "powf"];
-
 /// The habit behind a syntax error at a place of the text of an argument, and what to underline.
 pub(super) fn slip(argument: &str, text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
     let at = at + (text[at..].len() - text[at..].trim_start().len());
@@ -68,7 +65,7 @@ fn point(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
     let end = start + field.end;
     let (name, field) = (text[object.clone()].to_owned(), text[start..end].to_owned());
     let called = text[end..].trim_start().starts_with('(');
-    let is_method = is_function(&field) || POWERS.contains(&&*field);
+    let is_method = is_function(&field) || matches!(field.as_str(), "powi" | "powf");
     let kind = if called && is_method {
         Kind::MethodCall {
             object: name,
@@ -136,6 +133,7 @@ mod tests {
         check("output(a) = link §. m", "link . m", "FieldAccess");
         check("output(a) = x§.sin()", "x.sin", "MethodCall");
         check("output(a) = x§.powi(2)", "x.powi", "MethodCall");
+        check("output(a) = x§.powi", "x.powi", "FieldAccess");
         check("output(a) = §|x| x^2", "|", "Bars");
     }
 
