@@ -112,6 +112,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ => "swings on".to_owned(),
         };
         println!("{:11.0}   {back:>35}   {largest:17.1}", 1e3 * sample);
+        // An independent simulation, by the method of Runge and Kutta, gives 2.7 to 3.3 s.
+        let returned = away.map_or(0.0, |[t, ..]| t - PUSH);
+        assert_eq!(fell, sample > 0.15, "samples every {sample} s");
+        assert!(fell || (2.5..3.5).contains(&returned), "{returned} s");
         if [0.005, 0.1, 0.15].contains(&sample) {
             shown.push((sample, rows));
         }

@@ -100,8 +100,16 @@ impl<const N: usize> Run<N> {
     }
 
     /// The row of the table; `conserved` where the model conserves its energy.
+    ///
+    /// # Panics
+    /// Where a constraint does not hold, or the motion is not that which it is compared with.
     pub fn row(&self, scene: &str, conserved: Energy, error: f64, against: &str) -> [String; 10] {
         let residual = self.motion.constraint_residual();
+        assert!(
+            residual.position < 1e-12 && error < 1e-3,
+            "{scene}: |φ| = {:e}, error {error:e}",
+            residual.position
+        );
         let energy = match conserved {
             Energy::Conserved => format!("{:.1e}", self.motion.energy_error()),
             Energy::Driven => "—".to_owned(),
