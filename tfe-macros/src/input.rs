@@ -32,7 +32,7 @@ fn name_span(item: TokenStream) -> Option<Span> {
 /// Checks that the struct can hold parameters.
 ///
 /// # Errors
-/// Fields without names or under a `cfg`; generic parameters other than const parameters.
+/// All of these at once: fields without names or under a `cfg`; generic parameters other than const parameters.
 pub(crate) fn check(item: &ItemStruct) -> syn::Result<()> {
     if let Fields::Unnamed(fields) = &item.fields {
         return Err(syn::Error::new_spanned(
@@ -40,31 +40,37 @@ pub(crate) fn check(item: &ItemStruct) -> syn::Result<()> {
             "a model's parameters need names\nhelp: write `struct Name { m: f64, g: f64 }`",
         ));
     }
-    let mut attributes = item.fields.iter().flat_map(|field| &field.attrs);
-    if let Some(attribute) = attributes.find(|one| one.path().is_ident("cfg")) {
-        return Err(syn::Error::new_spanned(
+    let parameters = item.generics.params.iter().filter_map(unusable);
+    let attributes = item.fields.iter().flat_map(|field| &field.attrs);
+    let configured = attributes.filter(|one| one.path().is_ident("cfg"));
+    let configured = configured.map(|attribute| {
+        syn::Error::new_spanned(
             attribute,
             "a parameter cannot depend on the configuration: its model is derived with it in any case\nhelp: put the `cfg` on the whole struct, and declare it once for each configuration",
-        ));
-    }
-    for parameter in &item.generics.params {
-        let message = match parameter {
-            GenericParam::Const(parameter) => match taken_by_generated_code(&parameter.ident) {
-                Some(message) => {
-                    return Err(syn::Error::new_spanned(&parameter.ident, message));
-                }
-                None => continue,
-            },
-            GenericParam::Lifetime(_) => {
-                "a model can have const parameters only\nhelp: let it own its parameters: `f64`, `[f64; N]` or `Vec<f64>`"
-            }
-            _ => {
-                "a model can have const parameters only\nhelp: use `const N: usize` for a length; all parameters are `f64`"
-            }
-        };
-        return Err(syn::Error::new_spanned(parameter, message));
-    }
-    Ok(())
+        )
+    });
+    let all = parameters.chain(configured).reduce(|mut all, one| {
+        all.combine(one);
+        all
+    });
+    all.map_or(Ok(()), Err)
+}
+
+/// Why a model cannot have this generic parameter.
+fn unusable(parameter: &GenericParam) -> Option<syn::Error> {
+    let message = match parameter {
+        GenericParam::Const(parameter) => {
+            let message = taken_by_generated_code(&parameter.ident)?;
+            return Some(syn::Error::new_spanned(&parameter.ident, message));
+        }
+        GenericParam::Lifetime(_) => {
+            "a model can have const parameters only\nhelp: let it own its parameters: `f64`, `[f64; N]` or `Vec<f64>`"
+        }
+        _ => {
+            "a model can have const parameters only\nhelp: use `const N: usize` for a length; all parameters are `f64`"
+        }
+    };
+    Some(syn::Error::new_spanned(parameter, message))
 }
 
 /// Why a const parameter cannot have this name. No variable can have the name of a const parameter.

@@ -1,4 +1,4 @@
-//! Type parameters are no parameters of a model.
+//! Lifetimes and types are no parameters of a model.
 
 use tfe::prelude::*;
 
@@ -6,6 +6,6 @@ use tfe::prelude::*;
     coordinates(x),
     lagrangian = m/2*dot(x)^2 - k/2*x^2,
 )]
-struct Model<T> { m: f64, k: f64, x: T }
+struct Model<'a, T> { m: f64, k: f64, x: T, name: &'a str }
 
 fn main() {}
