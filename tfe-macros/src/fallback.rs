@@ -318,6 +318,12 @@ impl Guess {
                         guess.path = path;
                     }
                 }
+                None => {
+                    if let Some(count) = named_coordinates(&text[range]) {
+                        let count = Literal::usize_unsuffixed(count);
+                        guess.dof = quote!(#count);
+                    }
+                }
                 _ => {}
             }
         }
@@ -404,6 +410,26 @@ fn count(arrays: &[Array], item: &DeriveInput) -> TokenStream {
     }
     let fixed = Literal::usize_unsuffixed(fixed.max(1));
     quote!(#fixed)
+}
+
+/// How many names stand in `coordinates(x, y z)`, which cannot be read; of arrays the name alone.
+fn named_coordinates(argument: &str) -> Option<usize> {
+    let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let names = argument.trim_start().strip_prefix("coordinates")?;
+    if names.starts_with(is_word) {
+        return None;
+    }
+    let (mut count, mut depth, mut before) = (0_usize, 0_usize, ' ');
+    for letter in names.chars() {
+        match letter {
+            '[' => depth += 1,
+            ']' => depth = depth.saturating_sub(1),
+            letter if depth == 0 && letter.is_alphabetic() && !is_word(before) => count += 1,
+            _ => {}
+        }
+        before = letter;
+    }
+    (count > 0).then_some(count)
 }
 
 /// What models with inputs are asked for: a type parameter, which is a mistake, need not be more than it is.

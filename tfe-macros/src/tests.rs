@@ -454,6 +454,32 @@ fn dense(tokens: &TokenStream) -> String {
 }
 
 #[test]
+fn what_a_forgotten_comma_loses_has_no_mistakes_of_its_own() {
+    let expansion = |declaration| {
+        let item = quote!(
+            struct Model;
+        );
+        dense(&expand(declaration, item))
+    };
+    let between = expansion(quote!(
+        coordinates(x, y)
+        let height = y;
+        lagrangian = dot(x)^2 + dot(y)^2 - height
+        output(up) = height,
+    ));
+    // Before `let`, the semicolon, before `output`.
+    assert_eq!(between.matches("compile_error").count(), 3);
+    assert_eq!(between.matches("expectedacomma").count(), 3);
+    assert!(between.contains("State<2>") && between.contains("fnup("));
+    let inside = expansion(quote!(
+        coordinates(x, y z),
+        lagrangian = dot(x)^2 + dot(y)^2 + dot(z)^2,
+    ));
+    assert_eq!(inside.matches("compile_error").count(), 1);
+    assert!(inside.contains("State<3>"));
+}
+
+#[test]
 fn large_kernels_have_absolute_paths_too() {
     let expansion = expand(
         quote!(
