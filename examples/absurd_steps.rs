@@ -219,7 +219,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         all.wrong += count.wrong;
     }
     println!("{}", row("all", &all));
-    Ok(())
+    match all.wrong {
+        0 => Ok(()),
+        wrong => Err(format!("{wrong} of {} runs are wrong without a word", all.runs).into()),
+    }
 }
 
 fn row(name: &str, count: &Count) -> String {
