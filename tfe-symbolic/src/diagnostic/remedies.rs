@@ -345,6 +345,9 @@ impl Kind {
             Self::SolverOfFamily { .. } => {
                 "give the coordinates literal lengths, or use `Simulation`".into()
             }
+            Self::WrongArity {
+                function, found, ..
+            } => return wrong_arity(function, *found).map(str::to_owned),
             Self::Expected { found, .. } if found == "`\"`" => {
                 "formulas stand without quotes, as in `lagrangian = m/2*dot(x)^2`".into()
             }
@@ -355,7 +358,6 @@ impl Kind {
             | Self::LengthNotSimple
             | Self::TooManyCoordinates { .. }
             | Self::ForceTarget { .. }
-            | Self::WrongArity { .. }
             | Self::NoSuchElement { .. }
             | Self::DivisionByZero
             | Self::OutsideDomain { .. }
@@ -388,6 +390,19 @@ fn unknown_function(name: &str) -> String {
             let names: Vec<&str> = vocabulary::function_names().collect();
             format!("the functions are {}", backticked(&names))
         }
+    }
+}
+
+/// What was meant by a function with this many arguments.
+fn wrong_arity(function: &str, found: usize) -> Option<&'static str> {
+    match (function, found) {
+        ("dot", 2) => Some("`dot(e)` is the rate of e; write `inner(a, b)` for a scalar product"),
+        ("atan", 2) => Some("write `atan2(y, x)` for the angle of a point"),
+        ("norm", 2..) => Some("write a vector, as in `norm([x, y])`"),
+        ("hypot", 3..) => Some("write `norm([x, y, z])`"),
+        ("min", 3..) => Some("write `min(a, min(b, c))`"),
+        ("max", 3..) => Some("write `max(a, max(b, c))`"),
+        _ => None,
     }
 }
 
