@@ -119,7 +119,10 @@ impl Kind {
                 "choose another name".into()
             }
             Self::FamilyNotAlone { name } => {
-                format!("make the others elements of `{name}`, or give all arrays literal lengths")
+                format!(
+                    "make the others elements of `{name}`, give all arrays literal lengths, or make the \
+                     length a field of type `usize`"
+                )
             }
             Self::RunTimeLength { .. } => {
                 "give the coordinates a length known here, such as `q[10]`".into()
@@ -140,7 +143,9 @@ impl Kind {
                     .into()
             }
             Self::ConstraintRange { .. } => {
-                "write the constraints out, or give the array and the range literal lengths".into()
+                "write the constraints out, give the array and the range literal lengths, or make the \
+                 length of the array a field of type `usize`"
+                    .into()
             }
             Self::TooManyConstraints { .. } => "split the family into several shorter ones".into(),
             Self::SumInConstraint { limit, .. } => {
@@ -335,7 +340,7 @@ impl Kind {
             }
             Self::NonlinearSum { limit } => format!(
                 "make the length a number of at most {limit}, or rewrite the energy as a sum of \
-                 local terms"
+                 local terms; the square of a sum is a double sum"
             ),
             Self::NodesOutOfRange { .. } => "choose 2 to 12 nodes".into(),
             Self::PointsOutOfRange { .. } => {
