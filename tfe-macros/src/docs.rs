@@ -5,7 +5,7 @@ use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::syntax::parse;
 
-/// The doc comments of the arguments, each line with the argument that it stands before.
+/// The doc comments of the arguments, each line with the argument that it stands before, or inside of.
 #[derive(Default)]
 pub(crate) struct Docs(Vec<Doc>);
 
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn comments_belong_to_the_argument_behind_them() {
-        let source = "/// Where.\n coordinates(x), \
+        let source = "/// Where.\n coordinates(/// To the right.\n x), \
             /// The height,\n /// in (metres.\n output(height) = x, \
             /// Length 1.\n constraint(rod) = x^2 - 1, \
             /// Fast.\n solver(Fast, Mixed::<3>), \
@@ -145,6 +145,7 @@ mod tests {
             "\"\"",
             "\" * `coordinates`:\"",
             "\" Where.\"",
+            "\" To the right.\"",
             "\" * `constraint(rod)`:\"",
             "\" Length 1.\"",
             "\" * `let a`:\"",

@@ -16,9 +16,9 @@ pub(crate) struct SourceMap {
     pub(crate) text: String,
     entries: Vec<(Range<usize>, Span)>,
     end: Span,
-    /// Doc comments between arguments, which are no part of the text: where they stood, and what stood right of `doc =`.
+    /// Doc comments between and inside of arguments, which are no part of the text: where they stood, and what stood right of `doc =`.
     pub(crate) docs: Vec<(usize, TokenStream)>,
-    /// Other attributes between arguments, which are mistakes and no part of the text either: their first and last tokens.
+    /// Other attributes there, which are mistakes and no part of the text either: their first and last tokens.
     pub(crate) attributes: Vec<(Span, Span)>,
     /// `$crate` of the `macro_rules!` macro that wrote `crate = $crate::path`.
     dollar_crate: Option<Ident>,
@@ -35,22 +35,7 @@ impl SourceMap {
             attributes: Vec::new(),
             dollar_crate: None,
         };
-        let mut tokens = tokens.into_iter().peekable();
-        let mut before_docs = Vec::new();
-        while let Some(token) = tokens.next() {
-            match attribute(&token, tokens.peek()) {
-                Some(attribute) => {
-                    tokens.next();
-                    map.walk(before_docs.drain(..).collect());
-                    match attribute {
-                        Attribute::Doc(text) => map.docs.push((map.text.len(), text)),
-                        Attribute::Other(spans) => map.attributes.push(spans),
-                    }
-                }
-                None => before_docs.push(token),
-            }
-        }
-        map.walk(before_docs.into_iter().collect());
+        map.walk(tokens);
         map.end = map
             .entries
             .last()
@@ -59,7 +44,16 @@ impl SourceMap {
     }
 
     fn walk(&mut self, tokens: TokenStream) {
-        for token in tokens {
+        let mut tokens = tokens.into_iter().peekable();
+        while let Some(token) = tokens.next() {
+            if let Some(attribute) = attribute(&token, tokens.peek()) {
+                tokens.next();
+                match attribute {
+                    Attribute::Doc(text) => self.docs.push((self.text.len(), text)),
+                    Attribute::Other(spans) => self.attributes.push(spans),
+                }
+                continue;
+            }
             match token {
                 TokenTree::Group(group) => {
                     // An invisible group is an expression substituted by a `macro_rules!` macro: it binds like parentheses, and a
@@ -155,7 +149,7 @@ impl SourceMap {
     }
 }
 
-/// An attribute between arguments.
+/// An attribute between or inside of arguments.
 enum Attribute {
     /// What stands right of `doc =` in `#[doc = …]`, of which `///` is short for.
     Doc(TokenStream),
@@ -257,6 +251,14 @@ mod tests {
         ));
         assert_eq!(map.text.trim_end(), "coordinates (x ), output (a )= x");
         assert_eq!(map.attributes.len(), 1);
+        let inside = SourceMap::new(quote!(coordinates(
+            /// An angle.
+            x,
+            #[cfg(test)]
+            y
+        )));
+        assert_eq!(inside.text.trim_end(), "coordinates (x , y )");
+        assert_eq!((inside.docs.len(), inside.attributes.len()), (1, 1));
     }
 
     #[test]
