@@ -48,6 +48,11 @@ kinds! {
         /// What stands right of it.
         right: String,
     },
+    /// `1.0_f64`
+    NumberWithType {
+        /// The number without its type.
+        number: String,
+    },
     /// `**`
     DoubleStar,
     /// `a..=b`

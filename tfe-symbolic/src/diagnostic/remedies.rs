@@ -10,6 +10,7 @@ impl Kind {
         Some(match self {
             Self::MissingComma { .. } => "arguments are separated by commas".into(),
             Self::MissingOperator { left, right } => format!("write `{left}*{right}`"),
+            Self::NumberWithType { number } => format!("write `{number}`"),
             Self::DoubleStar => "write `^` for a power".into(),
             Self::InclusiveRange => "write `a..b+1`".into(),
             Self::Condition { .. } => {

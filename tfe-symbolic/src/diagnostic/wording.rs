@@ -12,6 +12,7 @@ impl Kind {
             Self::MissingOperator { left, right } => {
                 format!("missing operator between `{left}` and `{right}`")
             }
+            Self::NumberWithType { .. } => "numbers in formulas have no type".into(),
             Self::DoubleStar => "`**` is not an operator".into(),
             Self::InclusiveRange => "`..=` is not supported in sums".into(),
             Self::Condition { word } => format!("`{word}` is not part of the language of formulas"),

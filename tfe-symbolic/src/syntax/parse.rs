@@ -355,6 +355,9 @@ impl Builder<'_> {
             })
             .map_infix(|left, operator, right| {
                 let (left, right) = (left?, right?);
+                if operator.as_rule() == Rule::missing && is_type(&right) {
+                    return Some(left);
+                }
                 let operator = match operator.as_rule() {
                     Rule::add => BinaryOperator::Add,
                     Rule::subtract => BinaryOperator::Subtract,
@@ -389,13 +392,18 @@ impl Builder<'_> {
             .windows(3)
             .filter(|window| window[1].as_rule() == Rule::missing)
         {
-            let span = self.span(&window[0]).join(self.span(&window[2]));
             let (left, right) = (window[0].as_str().trim(), window[2].as_str().trim());
+            // Without the blanks behind a name.
+            let end = self.span(&window[2]).start + right.len();
+            let span = Span::new(self.span(&window[0]).start, end);
             if is_function(left) {
                 let name = left.to_owned();
                 let start = self.span(&window[0]).start;
                 let span = Span::new(start, start + left.len());
                 self.bag.push(span, Kind::FunctionAsValue { name });
+            } else if window[0].as_rule() == Rule::number && TYPES_OF_NUMBERS.contains(&right) {
+                let number = left.trim_end_matches('_').to_owned();
+                self.bag.push(span, Kind::NumberWithType { number });
             } else {
                 let (left, right) = (left.to_owned(), right.to_owned());
                 self.bag.push(span, Kind::MissingOperator { left, right });
@@ -469,6 +477,16 @@ impl Builder<'_> {
             .map(|pair| self.expression(pair))
             .collect()
     }
+}
+
+/// What Rust may write behind a number, as in `1.0_f64`.
+const TYPES_OF_NUMBERS: &[&str] = &[
+    "f64", "f32", "usize", "isize", "u8", "u16", "u32", "u64", "i8", "i16", "i32", "i64",
+];
+
+/// Whether this is the type of a number, which has been reported.
+fn is_type(expr: &Expr) -> bool {
+    matches!(&expr.node, ExprKind::Name(name) if TYPES_OF_NUMBERS.contains(&name.as_str()))
 }
 
 /// The inner pairs of a rule, punctuation skipped.
