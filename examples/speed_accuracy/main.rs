@@ -13,7 +13,7 @@ mod runs;
 mod scenes;
 mod table;
 
-use runs::Scene;
+use runs::{Scene, TARGETS};
 use scenes::lattice::lattice;
 use scenes::oscillators::{double_pendulum, henon_heiles, pendulum, van_der_pol};
 use scenes::planets::{kepler, solar_system};
@@ -61,6 +61,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}", table::line(HEADER));
     for (name, scene) in SCENES {
         let scene = scene().map_err(|error| format!("{name}: {error}"))?;
+        let [loosest, ..] = TARGETS;
+        if scene.measured.fastest(loosest).is_none() {
+            return Err(format!("{name}: no element reaches an error of {loosest:e}").into());
+        }
         for row in table::rows(&scene) {
             println!("{}", table::line(row.each_ref().map(String::as_str)));
             rows.push(row);
