@@ -83,6 +83,11 @@ kinds! {
         /// The name right of it.
         method: String,
     },
+    /// `std::f64::consts::PI`
+    Path {
+        /// The path without blanks.
+        path: String,
+    },
     /// `|x| x^2`, or `|x|` for an absolute value.
     Bars,
     /// Too many brackets, powers or signs inside each other.

@@ -36,6 +36,13 @@ impl Kind {
                 2 => format!("write `{method}({object}, …)`"),
                 _ => format!("write `{method}({object})`"),
             },
+            Self::Path { path } => match path.rsplit("::").next() {
+                Some("PI") => "write `pi`".into(),
+                Some(name) if vocabulary::is_function(name) => format!("write `{name}(…)`"),
+                _ => {
+                    "formulas use fields of the struct, coordinates and `let`s, by their names".into()
+                }
+            },
             Self::Bars => {
                 "write `abs(x)` for an absolute value, and the formula itself instead of a closure".into()
             }

@@ -23,6 +23,7 @@ impl Kind {
             Self::MethodCall { method, .. } => {
                 format!("a formula cannot call the method `{method}`")
             }
+            Self::Path { path } => format!("a formula cannot hold the path `{path}`"),
             Self::Bars => "`|` is not part of the language of formulas".into(),
             Self::NestedTooDeep { limit } => {
                 format!("expression is nested more than {limit} levels deep")

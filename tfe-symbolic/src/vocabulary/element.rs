@@ -27,7 +27,7 @@ impl Family {
         Self::Radau,
     ];
 
-    /// The name in `solver(Name: Mixed::<4>)`, and of the type of the runtime.
+    /// The name in `solver(Name, Mixed::<4>)`, and of the type of the runtime.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Primal => "Primal",

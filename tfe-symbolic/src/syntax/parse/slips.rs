@@ -11,6 +11,7 @@ pub(super) fn slip(argument: &str, text: &str, at: usize) -> Option<(Bytes<usize
     condition(text, at).or_else(|| match text[at..].chars().next()? {
         '=' => equals_sign(argument, text, at),
         '.' => point(text, at),
+        ':' if !matches!(argument, "solver" | "crate") => path(text, at),
         '|' => Some((at..at + 1, Kind::Bars)),
         _ => None,
     })
@@ -80,6 +81,30 @@ fn point(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
     Some((object.start..end, kind))
 }
 
+/// `std::f64::consts::PI`
+fn path(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
+    let first = words(&text[..at]).last()?;
+    if !text[first.end..at].trim().is_empty() {
+        return None;
+    }
+    let (mut path, mut end) = (text[first.clone()].to_owned(), at);
+    while let Some(word) = behind_colons(&text[end..]) {
+        path += "::";
+        path += &text[end..][word.clone()];
+        end += word.end;
+    }
+    (end > at).then_some((first.start..end, Kind::Path { path }))
+}
+
+/// The place of the word behind `::`.
+fn behind_colons(text: &str) -> Option<Bytes<usize>> {
+    let rest = text.trim_start().strip_prefix(':')?;
+    let rest = rest.trim_start().strip_prefix(':')?.trim_start();
+    let start = text.len() - rest.len();
+    let word = words(rest).next().filter(|word| word.start == 0)?;
+    Some(start..start + word.end)
+}
+
 /// The places of names, in order.
 fn words(text: &str) -> impl Iterator<Item = Bytes<usize>> {
     let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
@@ -135,6 +160,12 @@ mod tests {
         check("output(a) = x§.powi(2)", "x.powi", "MethodCall");
         check("output(a) = x§.powi", "x.powi", "FieldAccess");
         check("output(a) = §|x| x^2", "|", "Bars");
+        check(
+            "output(a) = 2*std §:: f64::consts::PI*t",
+            "std :: f64::consts::PI",
+            "Path",
+        );
+        check("output(a) = f64§::sin(x)", "f64::sin", "Path");
     }
 
     #[test]
@@ -142,6 +173,7 @@ mod tests {
         for text in [
             "output(a) = x + §)",
             "output(a) = 2 §.5",
+            "let a§: f64 = 2",
             "§= 3",
             "constraint(a) = select(x §== y, 1, 2)",
         ] {
