@@ -73,13 +73,27 @@ fn unusable(parameter: &GenericParam) -> Option<syn::Error> {
     Some(syn::Error::new_spanned(parameter, message))
 }
 
+/// Variables of generated code that are none of the kernels': arguments of methods, what stands in these, and indices of loops.
+const VARIABLES: [&str; 15] = [
+    "by", "end", "i", "index", "j", "k", "l", "left", "made", "model", "original", "p", "state",
+    "tau", "value",
+];
+
+/// Whether a temporary may have this name: `t12`, `sin_x`.
+fn is_temporary(name: &str) -> bool {
+    let number = name.strip_prefix('t');
+    let is_numbered = number.is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_digit()));
+    is_numbered || name.starts_with("sin_") || name.starts_with("cos_")
+}
+
 /// Why a const parameter cannot have this name. No variable can have the name of a const parameter.
 fn taken_by_generated_code(name: &Ident) -> Option<String> {
     let name = plain(name);
     let what = match name.as_str() {
         "R" => "the scalar",
         "t" => "a variable",
-        other if LOCALS.contains(&other) || other.starts_with("__") => "a variable",
+        other if LOCALS.contains(&other) || VARIABLES.contains(&other) => "a variable",
+        other if is_temporary(other) || other.starts_with("__") => "a variable",
         _ => return None,
     };
     Some(format!(

@@ -1,5 +1,7 @@
 //! Golden expansions: what `#[dynamics]` writes for a few models, as readable Rust. `UPDATE_GOLDEN=1 cargo test -p tfe-macros` rewrites them.
 
+mod mistakes;
+
 use crate::expand::expand;
 use proc_macro2::{TokenStream, TokenTree};
 use quote::quote;
@@ -423,60 +425,9 @@ fn doc_comments_inside_the_attribute() {
     );
 }
 
-#[test]
-fn names_that_nothing_can_have_are_mistakes_without_a_panic() {
-    for name in ["crate", "self", "super", "Self", "_"] {
-        let name = proc_macro2::Ident::new(name, proc_macro2::Span::call_site());
-        let declarations = [
-            quote!(coordinates(x), lagrangian = dot(x)^2, output(#name) = x),
-            quote!(coordinates(x, y), lagrangian = dot(x)^2 + dot(y)^2, constraint(#name) = x - y),
-            quote!(coordinates(#name), lagrangian = dot(#name)^2),
-            quote!(coordinates(x), let #name = x, lagrangian = dot(x)^2),
-            quote!(coordinates(x), lagrangian = dot(x)^2, solver(#name, Mixed::<2>)),
-            quote!(coordinates(x), lagrangian = dot(x)^2 + cos(x), model(#name, truncated(2))),
-        ];
-        for declaration in declarations {
-            let expansion = expand(
-                declaration.clone(),
-                quote!(
-                    struct Model {}
-                ),
-            )
-            .to_string();
-            assert!(expansion.contains("compile_error"), "{declaration}");
-        }
-    }
-}
-
 /// Without the blanks, which depend on who prints the tokens.
 fn dense(tokens: &TokenStream) -> String {
     tokens.to_string().split_whitespace().collect()
-}
-
-#[test]
-fn what_a_forgotten_comma_loses_has_no_mistakes_of_its_own() {
-    let expansion = |declaration| {
-        let item = quote!(
-            struct Model;
-        );
-        dense(&expand(declaration, item))
-    };
-    let between = expansion(quote!(
-        coordinates(x, y)
-        let height = y;
-        lagrangian = dot(x)^2 + dot(y)^2 - height
-        output(up) = height,
-    ));
-    // Before `let`, the semicolon, before `output`.
-    assert_eq!(between.matches("compile_error").count(), 3);
-    assert_eq!(between.matches("expectedacomma").count(), 3);
-    assert!(between.contains("State<2>") && between.contains("fnup("));
-    let inside = expansion(quote!(
-        coordinates(x, y z),
-        lagrangian = dot(x)^2 + dot(y)^2 + dot(z)^2,
-    ));
-    assert_eq!(inside.matches("compile_error").count(), 1);
-    assert!(inside.contains("State<3>"));
 }
 
 #[test]
