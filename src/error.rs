@@ -22,7 +22,7 @@ pub enum RunErrorKind {
     Element(ElementError),
     /// Of a model of run-time length: lengths that do not belong together, or something that such models cannot do yet.
     Family(family::ModelError),
-    /// The step is zero, infinite or not a number.
+    /// The step is zero, infinite or not a number, as it is where a run without an end is not given one.
     Step {
         /// The step asked for.
         step: f64,
@@ -289,6 +289,9 @@ impl fmt::Display for RunErrorKind {
         match self {
             Self::Element(error) => error.fmt(f),
             Self::Family(error) => error.fmt(f),
+            Self::Step { step } if step.is_nan() => f.write_str(
+                "the step is not a number; runs without an end (`steps`, `hold`, `section`) have none by default: give it by `step(h)`",
+            ),
             Self::Step { step } => {
                 let step = Short(*step);
                 write!(f, "the step is {step}, but it must be finite and not zero")

@@ -245,8 +245,8 @@ where
         M::mesh(span, &self.grid())
     }
 
-    /// The states that follow `start`, one a step, without end and in constant memory; elements end at [breaks](Self::break_at), as in [`run`](Self::run). After an error the iterator
-    /// is finished. [`Steps::warnings`] tells what is doubtful about the steps so far.
+    /// The states that follow `start`, one a [`step`](Self::step), which has to be given, without end and in constant memory; elements end at [breaks](Self::break_at), as in [`run`](Self::run).
+    /// After an error the iterator is finished. [`Steps::warnings`] tells what is doubtful about the steps so far.
     ///
     /// A step in which an [event](Self::on) changes the state or a parameter has two more nodes, with the states before and after; after the node at which an event stops the run the
     /// iterator is finished. [`Steps::events`] tells those of the last step.

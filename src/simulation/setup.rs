@@ -121,7 +121,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         }
     }
 
-    /// The element: `Mixed::<4>`, `Primal::<3>.reduced()`, `Element::mixed(n)`, …; for models of run-time length without the feature `sparse` those that are Runge–Kutta methods, with
+    /// The element: `Mixed::<4>`, which is the default, `Primal::<3>.reduced()`, `Element::mixed(n)`, …; for models of run-time length without the feature `sparse` those that are Runge–Kutta methods, with
     /// constraints those of them with Gauss points.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
@@ -129,7 +129,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         self
     }
 
-    /// The step h, in the units of time. Where the span is no whole number of steps the last one is shorter.
+    /// The step h, in the units of time; by default a thousandth of the span, where there is one. Where the span is no whole number of steps the last one is shorter.
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
@@ -172,7 +172,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         self
     }
 
-    /// The most iterations an element may take before the run stops with an error.
+    /// The most iterations an element may take before the run stops with an error, 100 by default.
     #[must_use]
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.control.max_iterations = iterations;
