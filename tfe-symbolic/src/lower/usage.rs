@@ -46,7 +46,8 @@ impl Lowerer<'_> {
         energy: Option<ExprId>,
         others: (&[Constraint], &[Force], Option<ExprId>),
     ) {
-        if self.model.incomplete {
+        // Without an energy, which has been reported, it is too early to call anything unused.
+        if self.model.incomplete || self.model.energy.is_none() {
             return;
         }
         self.check_fields();
