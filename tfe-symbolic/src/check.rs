@@ -160,6 +160,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
         if argument.stands_once() && seen.contains(&argument) {
             let argument = argument.word();
             bag.push(span, Kind::RepeatedArgument { argument });
+            model.names_missing |= item.argument().declares_names();
             continue;
         }
         seen.push(argument);

@@ -358,6 +358,15 @@ impl Kind {
             Self::SolverOfFamily { .. } => {
                 "give the coordinates literal lengths, or use `Simulation`".into()
             }
+            Self::RepeatedArgument { argument } => match *argument {
+                "coordinates" | "momenta" | "sensitivity" => {
+                    format!("name all in one `{argument}(…)`")
+                }
+                "lagrangian" | "hamiltonian" | "dissipation" => {
+                    format!("add up the terms in one `{argument} = …`")
+                }
+                _ => "keep one of them".into(),
+            },
             Self::WrongArity {
                 function, found, ..
             } => return wrong_arity(function, *found).map(str::to_owned),
@@ -366,7 +375,6 @@ impl Kind {
             }
             Self::Expected { .. }
             | Self::NumberTooLarge { .. }
-            | Self::RepeatedArgument { .. }
             | Self::ZeroLength { .. }
             | Self::LengthNotSimple
             | Self::TooManyCoordinates { .. }

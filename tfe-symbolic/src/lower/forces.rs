@@ -71,20 +71,32 @@ impl Lowerer<'_> {
                     .collect()
             }
             None => {
-                let text = target.to_string();
-                let coordinates = self.model.coordinates.iter().map(|slots| &*slots.name.node);
-                let nearest = nearest(&text, coordinates);
-                self.report(
-                    target.span,
-                    Kind::ForceTarget {
-                        target: text,
-                        nearest,
-                    },
-                );
+                if !self.may_be_missing(target) {
+                    let text = target.to_string();
+                    let coordinates = self.model.coordinates.iter().map(|slots| &*slots.name.node);
+                    let nearest = nearest(&text, coordinates);
+                    self.report(
+                        target.span,
+                        Kind::ForceTarget {
+                            target: text,
+                            nearest,
+                        },
+                    );
+                }
                 self.value(value);
                 Vec::new()
             }
         }
+    }
+
+    /// Whether a target names something that an argument with a mistake may declare.
+    fn may_be_missing(&self, target: &Expr) -> bool {
+        let array = match &target.node {
+            ExprKind::Index { value, .. } => &value.node,
+            node => node,
+        };
+        self.model.names_missing
+            && matches!(array, ExprKind::Name(name) if self.symbol(name).is_none())
     }
 
     /// The first flat index of a coordinate and the length of an array.
