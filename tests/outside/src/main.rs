@@ -91,6 +91,99 @@ struct KnifeEdge {
     alpha: f64,
 }
 
+/// A ball on the ground, with an input, an event, an output, and parameters by which it is differentiated.
+#[dynamics(
+    coordinates(y),
+    lagrangian = m/2*dot(y)^2 - m*g*y,
+    input(u),
+    force(y) = u - c*dot(y),
+    event(impact) = y,
+    output(height) = y,
+    sensitivity(g, c),
+)]
+struct Ball {
+    m: f64,
+    g: f64,
+    c: f64,
+}
+
+/// Events, inputs, derivatives, a loop of control, a fit.
+fn steered() -> Result<(), Box<dyn std::error::Error>> {
+    let ball = Ball {
+        m: 1.0,
+        g: 9.81,
+        c: 0.1,
+    };
+    let start = ball.state([1.0], [0.0]);
+    let simulation = Simulation::new(&ball)
+        .element(Mixed::<4>)
+        .step(0.01)
+        .on("impact", Crossing::Falling, |event| {
+            Act::Restart(event.state_with_velocity([-0.8 * event.v[0]]))
+        })
+        .input("u", |t| 0.1 * t.sin());
+    let motion = simulation.run(start, 0.0..2.0)?;
+    let impact = motion.events().first().ok_or("the ball falls")?;
+    assert!(impact.name == "impact" && !impact.rises && impact.v[0] < 0.0);
+    assert!((impact.t - 0.45).abs() < 0.02 && impact.q[0].abs() < 1e-12 && impact.p[0] < 0.0);
+
+    let s = simulation.run_sensitive(start, 0.0..2.0)?;
+    let by_g = s.by("g").last().q[0];
+    assert_eq!(s.by_start().last().nrows(), 2);
+    let loss = tfe::sensitivity::Loss::at_end(|node| node.q[0]);
+    let (height, gradient) = simulation.gradient(start, 0.0..2.0, &loss)?;
+    assert!((height - motion.last().q[0]).abs() < 1e-12);
+    assert!((gradient.by("g") - by_g).abs() < 1e-9 * (1.0 + by_g.abs()));
+
+    let mut run = Simulation::new(&ball).step(0.01).hold(start, 0.0)?;
+    for _ in 0..100 {
+        let (y, v) = (run.node().q[0], run.node().v[0]);
+        run.set("u", 9.81 - (y - 1.0) - 2.0 * v);
+        run.advance()?;
+    }
+    assert!((run.node().q[0] - 1.0).abs() < 1e-12 && run.node().output("height").is_some());
+
+    let times: Vec<f64> = (0..=20).map(|k| 0.1 * f64::from(k)).collect();
+    let film = Simulation::new(&ball).step(0.1).run(start, 0.0..2.0)?;
+    let measured: Vec<f64> = film.states().iter().map(|node| node.q[0]).collect();
+    let guess = Ball {
+        g: 9.0,
+        c: 0.2,
+        ..ball
+    };
+    let fit = Fit::new(&guess)
+        .start(start, 0.0)
+        .step(0.1)
+        .parameters(["g", "c"])
+        .output("height", &times, &measured)
+        .solve()?;
+    assert!((fit.value("g").ok_or("a parameter")? - 9.81).abs() < 1e-8);
+    assert!(fit.covariance().nrows() == 2 && fit.residuals().len() == times.len());
+    Ok(())
+}
+
+/// Ensembles, accuracies and comparisons.
+fn compared(pendulum: &DoublePendulum, start: State<2>) -> Result<(), Box<dyn std::error::Error>> {
+    let ends = Ensemble::new(pendulum)
+        .element(Mixed::<6>)
+        .step(0.1)
+        .run(&[start; 10], 0.0..1.0)?;
+    assert!(ends.len() == 10 && ends.failures().count() == 0);
+    let motion = Simulation::new(pendulum)
+        .accuracy(1e-8)
+        .run(start, 0.0..1.0)?;
+    assert!(motion.error_estimate() < 1e-8);
+    let file = std::env::temp_dir().join("tfe-outside-work-precision.svg");
+    WorkPrecision::new(pendulum, start, 0.0..1.0)
+        .element(Primal::<3>)
+        .element(Mixed::<3>)
+        .element(Mixed::<6>)
+        .steps([0.1, 0.05, 0.02, 0.01])
+        .run()?
+        .save(file)?;
+    Ok(())
+}
+
 /// Constraints of both kinds.
 fn constrained() -> Result<(), Box<dyn std::error::Error>> {
     let pendulum = RodPendulum {
@@ -123,6 +216,7 @@ fn constrained() -> Result<(), Box<dyn std::error::Error>> {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     constrained()?;
+    steered()?;
     let pendulum = DoublePendulum {
         m1: 1.0,
         m2: 1.0,
@@ -132,6 +226,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         c: 0.0,
     };
     let start = pendulum.state([0.5, -0.3], [0.0, 0.0]);
+    compared(&pendulum, start)?;
     let motion = Simulation::new(&pendulum)
         .element(Mixed::<4>)
         .step(0.01)
