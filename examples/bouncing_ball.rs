@@ -83,6 +83,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         hop *= RESTITUTION;
         exact += hop;
     }
+    // The eighth hop ends after 4.17 s.
+    assert_eq!(impacts(&free).len(), 8);
     assert!(worst < 1e-13, "off by {worst:e}");
 
     let height = |motion: &Motion<1>| -> Result<Vec<(f64, f64)>, Box<dyn Error>> {
