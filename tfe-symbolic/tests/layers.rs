@@ -1,5 +1,5 @@
 //! The plan of the workspace by its imports: no circles among the files of any crate, nor among their folders, folders of the engine in layers, a line in `ARCHITECTURE.md` for
-//! every module, and every file of tests in a manifest.
+//! every module, in whose order they import each other, and every file of tests in a manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -87,6 +87,38 @@ fn every_module_has_a_line_in_the_tables() {
                 first.contains(&name)
             });
             assert!(has_line, "{crate_sources}: no line for {name}");
+        }
+    }
+}
+
+/// In the order of their tables.
+#[test]
+fn lower_rows_of_the_tables_import_upper_ones() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(root.join("../ARCHITECTURE.md")).expect("the file can be read");
+    for (heading, crate_sources) in [
+        ("## `tfe-runtime`", "../tfe-runtime/src"),
+        ("## `tfe`", "../src"),
+    ] {
+        let (_, section) = text.split_once(heading).expect("a section of the crate");
+        let section = section.split("\n## ").next().unwrap_or(section);
+        let rows: Vec<&str> = section
+            .lines()
+            .filter(|line| line.starts_with("| `"))
+            .collect();
+        let row = |module: &str| {
+            let name = format!("`{module}`");
+            let holds = |line: &&str| line.split('|').nth(1).unwrap_or_default().contains(&name);
+            rows.iter().position(holds)
+        };
+        for (module, imported) in by_folder(&imports(&sources(crate_sources))) {
+            for other in imported {
+                let is_upper = row(&other) <= row(&module);
+                assert!(
+                    is_upper,
+                    "{crate_sources}: `{module}` imports `{other}`, which stands in a lower row"
+                );
+            }
         }
     }
 }
