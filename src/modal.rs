@@ -112,7 +112,7 @@ impl<'m, M: Reducible<S>, S: PhasePoint, const R: usize> Modal<'m, M, R, S> {
         Ok(lowest)
     }
 
-    /// Its amplitudes and their rates, a = Φᵀ M (q − q_s) and ȧ = Φᵀ p: what the modes have of a state of the full model.
+    /// Its amplitudes and their rates, a = Φᵀ M (q − q_s) and ȧ = Φᵀ (p − c), c the momentum without velocity (T-114): what the modes have of a state of the full model.
     ///
     /// NaN, from which no run begins, where the state is not as long as the model.
     pub fn reduce(&self, state: &S) -> State<R> {

@@ -408,7 +408,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// The integral of an output from the start to every recorded node,
     ///
     /// ```text
-    /// ∫ y(t, q, q̇) dt ,     by the s Gauss points of every element, s the degree of its polynomial                   (T-109)
+    /// ∫ y(t, q, q̇) dt ,     by the s Gauss points of every element, s the degree of its polynomial                   (T-164)
     /// ```
     ///
     /// An element of collocation meets the equations of motion at these points, so the integral is as accurate as the nodes: as if it had been one more

@@ -182,7 +182,7 @@ mod tests {
                 }
             }
         }
-        // T-59 with ρ² → −σ: the matrix of two nodes has a pole at h = √6, and no likeness to e^h near it.
+        // T-54 with ρ² → −h²: the matrix of two nodes has a pole at h = √6, and no likeness to e^h near it.
         assert!(saddle().growth(Element::primal(2), 2.4).is_some());
     }
 

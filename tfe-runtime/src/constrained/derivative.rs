@@ -1,4 +1,4 @@
-//! The equations of a constrained element, differentiated: by its start, and by what moves or stretches it (T-78).
+//! The equations of a constrained element, differentiated: by its start, and by what moves or stretches it (T-30).
 
 use crate::condense::{Direction, System};
 use crate::constrained::element::{ConstrainedForm, Derivatives};
