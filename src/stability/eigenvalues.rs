@@ -171,7 +171,7 @@ fn is_negligible(h: &DMatrix<f64>, row: usize, norm: f64) -> bool {
     h[(row, row - 1)].abs() <= f64::EPSILON * size
 }
 
-/// One implicit double-shift QR sweep on the rows first..=last of a Hessenberg matrix, of at least three rows [Golub & Van Loan, §7.5].
+/// One implicit double-shift QR sweep on the rows first..=last of a Hessenberg matrix, of at least three rows [GVL, §7.5].
 ///
 /// Only the diagonal block is transformed: the blocks beside it do not influence the eigenvalues. An exceptional sweep uses arbitrary
 /// shifts, for matrices like permutations that the usual ones leave as they are.
