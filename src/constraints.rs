@@ -5,6 +5,7 @@
 
 pub(crate) mod allowed;
 
+use crate::numbers::row_of;
 use allowed::Held;
 use nalgebra::{DMatrix, DVector};
 use std::fmt;
@@ -129,11 +130,9 @@ impl<Name: fmt::Display> Reactions<Name> {
         Some(rows.map(|row| row[at]).collect())
     }
 
-    /// All reactions at one recorded node.
+    /// All reactions at one recorded node; `None` beyond the last node, if there are constraints.
     pub fn row(&self, node: usize) -> Option<&[f64]> {
-        let columns = self.names.len();
-        let start = node.checked_mul(columns)?;
-        self.values.get(start..start.checked_add(columns)?)
+        row_of(&self.values, self.names.len(), node)
     }
 }
 

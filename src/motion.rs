@@ -25,7 +25,7 @@ use crate::constraints::{ConstraintResidual, Reactions};
 use crate::csv::{self, Column};
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length, Polynomial};
-use crate::numbers::larger;
+use crate::numbers::{larger, row_of};
 use arcs::Arcs;
 use points::Points;
 use std::fmt;
@@ -98,11 +98,9 @@ impl Outputs {
         Some(values.step_by(self.names.len()).copied().collect())
     }
 
-    /// All columns at one recorded node, in the order of [`names`](Self::names).
+    /// All columns at one recorded node, in the order of [`names`](Self::names); `None` beyond the last node, if there are columns.
     pub fn row(&self, node: usize) -> Option<&[f64]> {
-        let columns = self.names.len();
-        let start = node.checked_mul(columns)?;
-        self.values.get(start..start.checked_add(columns)?)
+        row_of(&self.values, self.names.len(), node)
     }
 }
 
@@ -348,7 +346,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         }
     }
 
-    /// The recorded nodes, in the order of time.
+    /// The recorded nodes, in the order of the run, which may go back in time.
     pub fn states(&self) -> &[Node<N, L>] {
         &self.nodes
     }
@@ -520,7 +518,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         &self.statistics
     }
 
-    /// What is doubtful about the motion although no element failed, in the order of time; each can be printed.
+    /// What is doubtful about the motion although no element failed; each can be printed.
     ///
     /// None is no proof that the motion is right: [`Warning`] says what is looked for, and how often.
     pub fn warnings(&self) -> &[Warning] {

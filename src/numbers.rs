@@ -51,9 +51,15 @@ pub(crate) fn norm(numbers: &[f64]) -> f64 {
     largest * sum.sqrt()
 }
 
+/// A row of a table with so many columns, which is stored row by row; `None` beyond the last.
+pub(crate) fn row_of(table: &[f64], columns: usize, row: usize) -> Option<&[f64]> {
+    let start = row.checked_mul(columns)?;
+    table.get(start..start.checked_add(columns)?)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Short, larger};
+    use super::{Short, larger, row_of};
 
     #[test]
     fn numbers_have_no_rows_of_zeros() {
@@ -64,6 +70,15 @@ mod tests {
         );
         assert_eq!([1e-6, -2.5e300].map(shown), ["1e-6", "-2.5e300"]);
         assert_eq!([f64::NAN, f64::INFINITY].map(shown), ["NaN", "inf"]);
+    }
+
+    #[test]
+    fn there_is_no_row_beyond_the_last() {
+        let table = [1.0, 2.0, 3.0, 4.0];
+        assert_eq!(row_of(&table, 2, 1), Some(&table[2..]));
+        for beyond in [2, usize::MAX / 2, usize::MAX / 2 + 1, usize::MAX] {
+            assert_eq!(row_of(&table, 2, beyond), None, "{beyond}");
+        }
     }
 
     #[test]

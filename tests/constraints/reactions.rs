@@ -14,6 +14,7 @@ fn check_rod(motion: &Motion<2>, model: &RodPendulum, tolerance: f64) {
     let column = reactions.column("rod").expect("declared");
     assert_eq!(column.len(), motion.states().len());
     assert!(reactions.row(column.len()).is_none());
+    assert!(reactions.row(usize::MAX).is_none());
     for (k, (node, v)) in motion.states().iter().zip(motion.velocities()).enumerate() {
         let speed2 = v[0] * v[0] + v[1] * v[1];
         let expected = model.m * (model.g * node.q[1] - speed2) / (model.l * model.l);
