@@ -210,7 +210,7 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
-    /// The Legendre coefficients of h dq/dτ, then those of h dp/dτ; none of an element that was cut, whose [pieces](Self::pieces) have them.
+    /// The Legendre coefficients of dq/dτ, then those of dp/dτ; none of an element that was cut, whose [pieces](Self::pieces) have them.
     #[must_use]
     pub fn coefficients(&self) -> &[[f64; N]] {
         &self.rates

@@ -1,6 +1,6 @@
 //! The polynomials of an element, differentiated: as linear functions of its start and of directions, and what a loss has of them backwards (T-154).
 //!
-//! With the Legendre coefficients C of h dq/dτ and h dp/dτ, which are linear in the rates ν and the forces F at the points,
+//! With the Legendre coefficients C of dq/dτ and dp/dτ, which are linear in the rates ν and the forces F at the points,
 //!
 //! ```text
 //! δy(τ) = δy₀ + Σ_m ∫₀^τ P_m δC_m ,     δC^q_m = h Σ_j R_mj δν_j ,     δC^p_m = h Σ_l R*_ml δF_l ,
@@ -25,7 +25,7 @@ use alloc::vec::Vec;
 pub struct InsideSlopes {
     /// Of the state at the start of the piece, 2N rows, ordered (p, q).
     pub start: Vec<f64>,
-    /// Of the Legendre coefficients of h dq/dτ, N rows each, then of those of h dp/dτ.
+    /// Of the Legendre coefficients of dq/dτ, N rows each, then of those of dp/dτ.
     pub coefficients: Vec<f64>,
 }
 
@@ -34,7 +34,7 @@ pub struct InsideSlopes {
 pub struct InsideLoss {
     /// By the state at the start, ordered (p, q).
     pub start: Vec<f64>,
-    /// By the Legendre coefficients of h dq/dτ, a row of n each, then by those of h dp/dτ.
+    /// By the Legendre coefficients of dq/dτ, a row of n each, then by those of dp/dτ.
     pub coefficients: Vec<f64>,
 }
 

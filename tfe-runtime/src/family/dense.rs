@@ -292,7 +292,7 @@ fn coefficients(
     rows
 }
 
-/// What takes momenta at the points, at the start and at the end to the Legendre coefficients of h dp/dτ of the polynomial through them, where momenta jump at the ends (T-79): a row of points + 2 for
+/// What takes momenta at the points, at the start and at the end to the Legendre coefficients of dp/dτ of the polynomial through them, where momenta jump at the ends (T-79): a row of points + 2 for
 /// each coefficient.
 #[cfg(feature = "sparse")]
 pub(super) fn jumps(scheme: &SchemeRef<'_>) -> Vec<f64> {

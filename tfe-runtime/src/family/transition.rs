@@ -322,7 +322,7 @@ impl TransitionOperator {
         &self.by_parameters
     }
 
-    /// The derivatives of the Legendre coefficients of the element's polynomials by the same parameters: of h dq/dτ, a row of n each, then of h dp/dτ.
+    /// The derivatives of the Legendre coefficients of the element's polynomials by the same parameters: of dq/dτ, a row of n each, then of dp/dτ.
     #[must_use]
     pub fn inside_by_parameters(&self) -> &[Vec<f64>] {
         &self.inside_by_parameters
