@@ -15,7 +15,7 @@ pub enum Warning {
     /// time. Nonlinear motions leave such a neighbourhood sooner or later, and then the amplitude or the energy is wrong.
     ///
     /// Looked for at the start, in elements 1, 2, 4, 8, … and where a run fails, so that a long run costs no more; several in
-    /// a row are one warning. Elements that are stable at every step (all but primal ones without reduced quadrature) are not examined.
+    /// a row are one warning. Elements that are stable at every step ([`Element::is_a_stable`]) are not examined, nor are models with constraints or of run-time length.
     UnstableStep {
         /// Where the first such element begins.
         time: f64,
