@@ -342,6 +342,11 @@ where
                 continue;
             }
             let met = self.located(arc, &root, resolution);
+            // Where the run begins on zero the polynomial may first go the wrong way, by less than its error.
+            if met.time == arc.t && self.seen.sides[root.function] == 0.0 {
+                remaining.take(root.function);
+                continue;
+            }
             let (root, met) = self.earliest(arc, &remaining, (root, met), resolution);
             if self.is_seen_again(arc, &root, met.time) {
                 remaining.take(root.function);

@@ -524,3 +524,29 @@ fn calls_at_the_end_of_a_run_are_not_made_again_behind_it() {
         }
     }
 }
+
+/// A run that begins where a function vanishes does not meet it there, whatever the polynomial of the first element does within its error.
+#[test]
+fn zeros_at_the_start_are_no_events() {
+    let model = Oscillator { level: 0.0 };
+    // The velocity is −sin t.
+    let start = model.state([1.0], [0.0]);
+    for element in [
+        Element::mixed(4),
+        Element::mixed(6),
+        Element::primal(4),
+        Element::three_field(4),
+        Element::radau(4),
+    ] {
+        for span in [0.0..3.5, 0.0..-3.5] {
+            let run = Simulation::new(&model).element(element).step(0.1).on(
+                "speed",
+                Crossing::Either,
+                |_| Act::Stop,
+            );
+            let end = run.run(start, span).expect("a run").last().t;
+            let off = (end.abs() - std::f64::consts::PI).abs();
+            assert!(off < 1e-5, "{element}: {end}");
+        }
+    }
+}
