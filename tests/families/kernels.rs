@@ -225,3 +225,42 @@ fn the_pattern_of_a_chain_is_a_band() {
         }
     }
 }
+
+/// Nothing but pairs in the potential.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) + sum(i in 0..n, sum(j in 0..i, k*cos(q[i]-q[j]))),
+)]
+struct Pairs {
+    n: usize,
+    k: f64,
+}
+
+/// ∂²L/∂q_a∂q_b = k cos(q_a − q_b), and the rows of these add up to zero.
+#[test]
+fn pairs_of_differences_fill_their_diagonal() {
+    let k = 0.7;
+    for n in [1, 2, 5] {
+        let mut dense = Dense::default();
+        let (mut z, mut by_q) = ([0.0; 5], [0.0; 5]);
+        let gradient = Gradient {
+            z: &mut z,
+            q: &mut by_q,
+            force: &mut [],
+        };
+        family::Model::second(&Pairs { n, k }, T, &Q[..n], &V[..n], gradient, &mut dense);
+        let entry = |a: usize, b: usize| {
+            let found = dense.0.get(&(Block::QQ, a, b));
+            found.copied().unwrap_or(0.0)
+        };
+        let pair = |a: usize, b: usize| k * (Q[a] - Q[b]).cos();
+        for a in 0..n {
+            let others = (0..n).filter(|b| *b != a);
+            let diagonal: f64 = others.map(|b| pair(a, b)).sum();
+            close(entry(a, a), -diagonal, ORDER);
+            for b in (0..n).filter(|b| *b != a) {
+                close(entry(a, b), pair(a, b), ORDER);
+            }
+        }
+    }
+}

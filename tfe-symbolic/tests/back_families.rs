@@ -217,3 +217,21 @@ fn indices_that_begin_below_zero_at_some_lengths() {
         ]
     );
 }
+
+/// Pairs of two bodies in one loop: entries are told one by one, and nothing is read back from them.
+#[test]
+fn pairs_are_told_entry_by_entry() {
+    let pairs = || (1..4).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let family = "coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) + sum(i in 0..n, sum(j in 0..i, k*cos(q[i]-q[j])))";
+    let attraction: Vec<String> = pairs()
+        .map(|(i, j)| format!("k*cos(q[{i}]-q[{j}])"))
+        .collect();
+    let written = format!(
+        "coordinates(q[4]), lagrangian = {} + {}",
+        joined(0..4, |i| format!("dot(q[{i}])^2/2")),
+        attraction.join(" + ")
+    );
+    check(4, 0, family, &written);
+    let program = Derivation::of(&declared(family)).program(ALL).to_string();
+    assert!(!program.contains("balance"), "{program}");
+}
