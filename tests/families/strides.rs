@@ -22,10 +22,12 @@ struct Far {
     m: Vec<f64>,
 }
 
-/// [`Chain`] with indices that begin below zero, which generated loops count from zero.
+/// [`Chain`] with indices that begin below zero, which generated loops count from zero; and two outputs by site whose sums depend on the site.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in -2..n-2, dot(q[i+2])^2/2) - sum(i in -1..n-2, (q[i+2]-q[i+1])^2/2 + a/3*(q[i+2]-q[i+1])^3),
+    output(next_spread[i in 0..n-1]) = sqrt(sum(j in 0..n, (q[i+1] - q[j])^2)),
+    output(own_spread[i in 0..n]) = sqrt(sum(j in 0..n, (q[i] - q[j])^2)),
 )]
 struct Below {
     n: usize,
@@ -131,6 +133,26 @@ fn sums_that_begin_below_zero_have_all_their_turns() {
         below.forces_inline(0.0, &q, &v, of_forces(other));
         for (x, y) in forces[0].iter().zip(&forces[1]) {
             assert!((x - y).abs() < 1e-14, "{x} {y}");
+        }
+    }
+}
+
+/// The sum for the next site reads beyond the last one in a loop over all sites, which does not need it.
+#[test]
+fn sums_by_site_stay_in_their_loops() {
+    for n in [2, 3, 17] {
+        let q: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
+        let (below, v) = (Below { n, a: 0.25 }, vec![0.0; n]);
+        let own = below.own_spread(0.0, &q, &v).expect("all sites");
+        let next = below.next_spread(0.0, &q, &v).expect("all but one");
+        assert_eq!((own.len(), next.len()), (n, n - 1));
+        for (i, length) in own.iter().enumerate() {
+            let expected: f64 = q.iter().map(|x| (q[i] - x).powi(2)).sum();
+            // Sums of at most seventeen squares below four.
+            assert!((length - expected.sqrt()).abs() < 1e-13, "{i} of {n}");
+        }
+        for (a, b) in next.iter().zip(&own[1..]) {
+            assert!((a - b).abs() < 1e-13, "{a} {b}");
         }
     }
 }

@@ -235,3 +235,23 @@ fn pairs_are_told_entry_by_entry() {
     let program = Derivation::of(&declared(family)).program(ALL).to_string();
     assert!(!program.contains("balance"), "{program}");
 }
+
+/// Sums that depend on the index of a loop are computed in that loop, and in no other of the same index that goes further.
+#[test]
+fn sums_stay_in_their_loops() {
+    let family = "coordinates(q[n], r[w]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) + sum(i in 0..w, dot(r[i])^2/2), \
+        force(q[i]) = sin(sum(j in 0..n, q[i]*q[j]^2)), force(r[i]) = cos(sum(j in 0..n, r[i]*q[j]))";
+    let squares = joined(0..5, |j| format!("q[{j}]^2"));
+    let total = joined(0..5, |j| format!("q[{j}]"));
+    let forces: Vec<String> = (0..5)
+        .map(|i| format!("force(q[{i}]) = sin(q[{i}]*({squares}))"))
+        .chain((0..3).map(|i| format!("force(r[{i}]) = cos(r[{i}]*({total}))")))
+        .collect();
+    let written = format!(
+        "coordinates(q[5], r[3]), lagrangian = {} + {}, {}",
+        joined(0..5, |i| format!("dot(q[{i}])^2/2")),
+        joined(0..3, |i| format!("dot(r[{i}])^2/2")),
+        forces.join(", ")
+    );
+    check(5, 3, family, &written);
+}

@@ -2,7 +2,7 @@
 
 use crate::expr::function::Function;
 use crate::expr::graph::{SumRange, loop_bit};
-use crate::expr::hash::Map;
+use crate::expr::hash::{Map, Set};
 use crate::expr::input::LoopVariable;
 use crate::expr::ordered::SortedSet;
 use crate::expr::sorting::sort_by_key;
@@ -55,6 +55,8 @@ struct Scope {
     bit: u64,
     statements: Vec<Statement>,
     values: Map<OpId, Operand>,
+    /// The operations with sums over ranges in them that a turn needs.
+    sums: Set<OpId>,
 }
 
 struct Scheduler {
@@ -118,7 +120,8 @@ impl Scheduler {
             self.sink(sink);
         }
         for (range, inner) in &block.inner {
-            self.open(range.variable);
+            let sums = self.sums_in(self.values_of(inner));
+            self.open(range.variable, sums);
             self.block(inner);
             self.close(range);
         }
@@ -183,11 +186,38 @@ impl Scheduler {
         Operand::Temporary(target)
     }
 
-    fn open(&mut self, variable: LoopVariable) {
+    fn open(&mut self, variable: LoopVariable, sums: Set<OpId>) {
         self.scopes.push(Scope {
             bit: loop_bit(variable),
+            sums,
             ..Scope::default()
         });
+    }
+
+    /// What is computed in a block and in the loops inside. Recursion is as deep as the loops nest.
+    fn values_of(&self, block: &Block) -> Vec<OpId> {
+        let starts = block.locals.iter().filter_map(|(_, start)| *start);
+        let sinks = block.sinks.iter().chain(&block.after);
+        let values = starts.chain(sinks.filter_map(|sink| sink.value));
+        let mut found: Vec<OpId> = values
+            .filter_map(|value| self.plan.value(value))
+            .map(|value| value.op)
+            .collect();
+        for (_, inner) in &block.inner {
+            found.extend(self.values_of(inner));
+        }
+        found
+    }
+
+    /// Of these operations and all that they need, those with sums over ranges in them.
+    fn sums_in(&self, operations: Vec<OpId>) -> Set<OpId> {
+        let (mut sums, mut waiting) = (Set::default(), operations);
+        while let Some(id) = waiting.pop() {
+            if self.plan.reduces(id) && sums.insert(id) {
+                waiting.extend(self.plan.op(id).operands());
+            }
+        }
+        sums
     }
 
     fn close(&mut self, range: &SumRange) {
@@ -329,9 +359,13 @@ impl Scheduler {
     }
 
     /// Computes a sum over a range, and with it in one loop all others over the same range that need no sum themselves.
+    ///
+    /// Others that depend on the loops around are taken along where these need them: another loop over the same index may go further, beyond
+    /// the arrays that they read.
     fn reduce(&mut self, id: OpId, range: &SumRange) {
         let level = self.level(id);
         let inside = self.scopes.split_off(level + 1);
+        let is_the_same_everywhere = self.plan.loops_of(id) == 0;
         let together: Vec<(OpId, OpId)> = self
             .reductions
             .iter()
@@ -344,6 +378,7 @@ impl Scheduler {
                     || (*own == range
                         && self.plan.loops_of(*other) == self.plan.loops_of(id)
                         && !self.plan.reduces(*body)
+                        && (is_the_same_everywhere || self.scopes[level].sums.contains(other))
                         && self.known(*other).is_none())
             })
             .map(|(other, _, body)| (other, body))
@@ -357,7 +392,8 @@ impl Scheduler {
             });
             totals.push((other, body, target));
         }
-        self.open(range.variable);
+        let sums = self.sums_in(totals.iter().map(|(_, body, _)| *body).collect());
+        self.open(range.variable, sums);
         for (_, body, target) in &totals {
             let value = self.operand(*body);
             self.append(Statement::Accumulate {
