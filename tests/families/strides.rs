@@ -22,10 +22,12 @@ struct Far {
     m: Vec<f64>,
 }
 
-/// [`Chain`] with indices that begin below zero, which generated loops count from zero; and two outputs by site whose sums depend on the site.
+/// [`Chain`] with indices that begin below zero, which generated loops count from zero; the last five of its sites, wherever they begin; and
+/// two outputs by site whose sums depend on the site.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in -2..n-2, dot(q[i+2])^2/2) - sum(i in -1..n-2, (q[i+2]-q[i+1])^2/2 + a/3*(q[i+2]-q[i+1])^3),
+    output(weights) = sum(i in n-5..n, (i - n + 6)*a),
     output(next_spread[i in 0..n-1]) = sqrt(sum(j in 0..n, (q[i+1] - q[j])^2)),
     output(own_spread[i in 0..n]) = sqrt(sum(j in 0..n, (q[i] - q[j])^2)),
 )]
@@ -134,6 +136,18 @@ fn sums_that_begin_below_zero_have_all_their_turns() {
         for (x, y) in forces[0].iter().zip(&forces[1]) {
             assert!((x - y).abs() < 1e-14, "{x} {y}");
         }
+    }
+}
+
+/// 1 + 2 + 3 + 4 + 5, where the five begin at -3 and at -2, too.
+#[test]
+fn sums_that_begin_below_zero_at_small_lengths_have_all_their_turns() {
+    let a = 0.25;
+    for n in [2, 3, 5, 9] {
+        let zeros = vec![0.0; n];
+        let weights = Below { n, a }.weights(0.0, &zeros, &zeros);
+        // Numbers of four bits.
+        assert_eq!(weights, Ok(15.0 * a), "{n} sites");
     }
 }
 

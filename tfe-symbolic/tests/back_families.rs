@@ -218,6 +218,22 @@ fn indices_that_begin_below_zero_at_some_lengths() {
     );
 }
 
+/// Messages tell the range as it is declared, and not that of the loop, which counts from zero.
+#[test]
+fn ranges_that_begin_below_zero_are_told_as_declared() {
+    let text = "coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in -1..n-2, k*(q[i+2]-q[i+1])^2)";
+    let requirements = declared(text).requirements;
+    let turns = requirements
+        .iter()
+        .find_map(|requirement| match requirement {
+            Requirement::Turns { ranges, start, end } if ranges == "i in -1..n-2" => {
+                Some((start.to_string(), end.to_string()))
+            }
+            _ => None,
+        });
+    assert_eq!(turns, Some(("-1".to_owned(), "n-2".to_owned())));
+}
+
 /// Pairs of two bodies in one loop: entries are told one by one, and nothing is read back from them.
 #[test]
 fn pairs_are_told_entry_by_entry() {

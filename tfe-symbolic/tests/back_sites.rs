@@ -188,6 +188,26 @@ fn requirements_name_the_constraint() {
     );
 }
 
+/// The last five of three sites would begin at -2.
+#[test]
+fn sites_begin_at_zero_or_above() {
+    let text = "coordinates(x[n]), lagrangian = sum(i in 0..n, dot(x[i])^2/2) - k*sum(i in 0..n-1, l[i]*x[i]^2), output(late[i in n-5..n]) = t*i";
+    let requirements = declared(text).requirements;
+    let found = requirements
+        .iter()
+        .find_map(|requirement| match requirement {
+            Requirement::Index {
+                array,
+                text,
+                ranges,
+                nest,
+                ..
+            } => Some((array.as_str(), text.as_str(), ranges.as_str(), nest.len())),
+            _ => None,
+        });
+    assert_eq!(found, Some(("late", "n-5", "output(late[i in n-5..n])", 0)));
+}
+
 /// Outputs by site and single ones, in order of declaration; the sum is one number for each site.
 #[test]
 fn outputs_by_site_are_numbered() {

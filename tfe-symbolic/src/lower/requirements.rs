@@ -66,10 +66,16 @@ impl Lowerer<'_> {
             return;
         }
         let index = Affine::symbol(IndexSymbol::Loop(range.variable));
+        // As declared: the loop may count from zero.
+        let offset = self.indices.last().map(|index| &index.offset);
+        let own = |bound: &Affine| {
+            let own = offset.and_then(|offset| bound.plus_scaled(offset, 1));
+            own.unwrap_or_else(|| bound.clone())
+        };
         let requirement = Requirement::Turns {
             ranges: self.stands_in(&index),
-            start: range.start.clone(),
-            end: range.end.clone(),
+            start: own(&range.start),
+            end: own(&range.end),
         };
         self.require(requirement);
     }
@@ -100,7 +106,7 @@ impl Lowerer<'_> {
 }
 
 /// Whether there are lengths for which an index is below zero.
-fn may_be_below_zero(index: &Affine) -> bool {
+pub(super) fn may_be_below_zero(index: &Affine) -> bool {
     index.constant < 0 || index.terms.iter().any(|(_, factor)| *factor < 0)
 }
 

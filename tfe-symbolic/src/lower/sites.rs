@@ -1,12 +1,13 @@
 //! Declarations by site of models of run-time length: one formula for all sites of a range.
 
 use super::constraints::{Row, components};
+use super::requirements::may_be_below_zero;
 use super::{DeclaredPlace, Index, LONGEST_WRITTEN_OUT, Lowerer};
 use crate::derive::constraint::{holds_state, holds_velocity, kind, normal};
 use crate::diagnostic::Kind;
 use crate::expr::graph::{ExprId, SumRange};
 use crate::expr::input::{Affine, IndexSymbol};
-use crate::model::declared::{Constraint, Observable};
+use crate::model::declared::{Constraint, Extent, Observable};
 use crate::syntax::ast::{Expr, Name, Range};
 
 /// What is known of the constraints before the one at hand.
@@ -117,6 +118,10 @@ impl Lowerer<'_> {
         let index = &range.variable.node;
         let text = format!("{argument}({name}[{index} in {start}..{end}])");
         self.place = Some(DeclaredPlace { text, own: 1 });
+        if may_be_below_zero(&start) {
+            // Sites have no index below zero, for small lengths neither.
+            self.require_index(&name.node, &start, Extent::Known(end.clone()));
+        }
         let variable = self.depth();
         let sites = SumRange {
             variable,

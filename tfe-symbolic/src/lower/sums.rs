@@ -1,5 +1,6 @@
 //! Sums over ranges: written out where short, loops elsewhere.
 
+use super::requirements::may_be_below_zero;
 use super::{Index, LONGEST_WRITTEN_OUT, Lowerer, SHORT_SUM, TurnByTurn, Value};
 use crate::check::reserved;
 use crate::diagnostic::{Kind, Role, Span};
@@ -113,12 +114,12 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The least value of a bound, where that is below zero, or may be for large lengths; else zero.
+    /// The least value of a bound, where that is below zero, or may be for some lengths; else zero.
     fn below_zero(&self, bound: &Affine) -> Affine {
         let least = self.extreme(bound, false).unwrap_or_default();
         match least.as_constant() {
             Some(least) => Affine::constant(least.min(0)),
-            None if least.terms.iter().any(|(_, factor)| *factor < 0) => least,
+            None if may_be_below_zero(&least) => least,
             None => Affine::default(),
         }
     }
