@@ -264,3 +264,21 @@ fn pairs_of_differences_fill_their_diagonal() {
         }
     }
 }
+
+/// Of fixed size, with a length that nothing checks.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - c[m-2]*x^2/2)]
+struct LastButOne {
+    m: usize,
+    c: Vec<f64>,
+}
+
+#[test]
+#[should_panic(expected = "index out of bounds")]
+fn an_index_below_zero_is_not_the_first() {
+    let energy = |m: usize| {
+        let c = vec![3.0];
+        LastButOne { m, c }.energy_function(T, &[2.0], &[0.0])
+    };
+    assert_eq!(energy(2), -6.0);
+    let _ = energy(1);
+}

@@ -6,12 +6,12 @@ mod values;
 use crate::balance::balance;
 use crate::headings::Headings;
 use crate::in_place::is_written_in_place;
-use crate::indices::{identifier, index, loop_name};
+use crate::indices::{identifier, index, loop_name, unchecked_index};
 use crate::parts::{Part, Parts};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 use tfe_symbolic::expr::function::Function;
-use tfe_symbolic::expr::input::{Affine, Input};
+use tfe_symbolic::expr::input::{Affine, Input, LoopVariable};
 use tfe_symbolic::expr::ordered::{SortedMap, SortedSet};
 use tfe_symbolic::program::{Array, Operand, Operation, Program, Statement, Temporary};
 
@@ -61,6 +61,8 @@ pub(crate) struct Emitter<'a> {
     reads: SortedMap<Temporary, usize>,
     /// The indices of all loops.
     indices: SortedSet<String>,
+    /// Those of them whose turns depend on fields that nothing has checked, as in models of fixed size.
+    unchecked: SortedSet<LoopVariable>,
     names: SortedMap<Temporary, Ident>,
     taken: SortedSet<String>,
     numbered: usize,
@@ -108,6 +110,7 @@ impl<'a> Emitter<'a> {
             headings: None,
             reads: SortedMap::new(),
             indices: SortedSet::new(),
+            unchecked: SortedSet::new(),
             names: SortedMap::new(),
             taken: SortedSet::new(),
             numbered: 0,
@@ -280,8 +283,17 @@ impl<'a> Emitter<'a> {
     /// Counts reads and collects indices.
     pub(crate) fn survey(&mut self, statements: &[Statement]) {
         for statement in statements {
-            if let Statement::Loop { variable, body, .. } = statement {
+            if let Statement::Loop {
+                variable,
+                start,
+                end,
+                body,
+            } = statement
+            {
                 self.indices.insert(variable.to_string());
+                if self.is_unchecked(start) || self.is_unchecked(end) {
+                    self.unchecked.insert(*variable);
+                }
                 self.survey(body);
             }
             for operand in statement.operands() {
@@ -290,6 +302,21 @@ impl<'a> Emitter<'a> {
                 }
             }
         }
+    }
+
+    /// Whether an index depends on fields that nothing has checked: those of models of run-time length are checked before a run.
+    fn is_unchecked(&self, index: &Affine) -> bool {
+        let varies = || self.unchecked.iter().any(|own| index.depends_on(*own));
+        !self.by_entries && (index.is_of_run_time() || index.holds_entry() || varies())
+    }
+
+    /// An element of an array. One below zero must not be taken for the first.
+    fn at(&self, array: &TokenStream, indices: &[&Affine]) -> TokenStream {
+        let indices = indices.iter().map(|a| match self.is_unchecked(a) {
+            true => unchecked_index(a),
+            false => index(a),
+        });
+        quote!(#array #([#indices])*)
     }
 
     pub(crate) fn statements(&mut self, statements: &[Statement]) -> TokenStream {

@@ -21,6 +21,19 @@ pub(crate) fn loop_name(variable: LoopVariable) -> Ident {
 
 /// An index as a `usize` expression that cannot overflow: what is subtracted saturates at zero.
 pub(crate) fn index(affine: &Affine) -> TokenStream {
+    less_each(affine, less)
+}
+
+/// An index that nothing has checked: where it is below zero it is beyond the end of every array.
+pub(crate) fn unchecked_index(affine: &Affine) -> TokenStream {
+    less_each(affine, |a, b| method_of(a, &quote!(wrapping_sub(#b))))
+}
+
+/// What an index is made of: the sum of all that is added, and then by `less` all that is subtracted.
+fn less_each(
+    affine: &Affine,
+    less: impl Fn(&TokenStream, &TokenStream) -> TokenStream,
+) -> TokenStream {
     let mut sum: Option<TokenStream> = None;
     for (symbol, coefficient) in affine.terms.iter().filter(|(_, c)| *c > 0) {
         let term = scaled(symbol, *coefficient);
@@ -50,14 +63,19 @@ pub(crate) fn index(affine: &Affine) -> TokenStream {
 
 /// `a - b`, or zero where `b` is larger.
 pub(crate) fn less(a: &TokenStream, b: &TokenStream) -> TokenStream {
+    method_of(a, &quote!(saturating_sub(#b)))
+}
+
+/// `a.call`, with parentheses where `a` is a sum or a product.
+fn method_of(a: &TokenStream, call: &TokenStream) -> TokenStream {
     let operators = ["+", "*"];
     if a.clone()
         .into_iter()
         .any(|token| operators.contains(&token.to_string().as_str()))
     {
-        quote!((#a).saturating_sub(#b))
+        quote!((#a).#call)
     } else {
-        quote!(#a.saturating_sub(#b))
+        quote!(#a.#call)
     }
 }
 
@@ -133,7 +151,7 @@ pub(crate) fn real(affine: &Affine) -> TokenStream {
     quote!(#constant #(#terms)*)
 }
 
-pub(crate) fn at(array: &TokenStream, indices: &[&Affine]) -> TokenStream {
+fn at(array: &TokenStream, indices: &[&Affine]) -> TokenStream {
     let indices = indices.iter().map(|a| index(a));
     quote!(#array #([#indices])*)
 }

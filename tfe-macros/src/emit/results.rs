@@ -1,7 +1,7 @@
 //! Where the results of kernels are written.
 
 use super::Emitter;
-use crate::indices::{at, index};
+use crate::indices::index;
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 use tfe_symbolic::program::{Array, Place};
@@ -23,8 +23,8 @@ impl Emitter<'_> {
 
     pub(super) fn place(&self, output: &Place) -> TokenStream {
         let second = &self.second;
-        let vector = |array: &TokenStream| at(array, &[&output.row]);
-        let matrix = |array: &TokenStream| at(array, &[&output.row, &output.column]);
+        let vector = |array: &TokenStream| self.at(array, &[&output.row]);
+        let matrix = |array: &TokenStream| self.at(array, &[&output.row, &output.column]);
         match output.array {
             Array::Value => quote!(value),
             Array::ByZ => vector(&quote!(first.z)),

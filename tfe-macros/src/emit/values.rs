@@ -1,7 +1,7 @@
 //! Operations and their operands.
 
 use super::Emitter;
-use crate::indices::{at, identifier, index, number, real, signed};
+use crate::indices::{identifier, index, number, real, signed};
 use proc_macro2::{Literal, TokenStream};
 use quote::{format_ident, quote};
 use tfe_symbolic::expr::comparison::Comparison;
@@ -77,12 +77,12 @@ impl Emitter<'_> {
     fn input(&mut self, input: &Input) -> TokenStream {
         match input {
             Input::Time => quote!(t),
-            Input::Coordinate(a) => at(&quote!(q), &[a]),
+            Input::Coordinate(a) => self.at(&quote!(q), &[a]),
             Input::Velocity(a) | Input::Momentum(a) => {
                 let z = &self.z;
-                at(&quote!(#z), &[a])
+                self.at(&quote!(#z), &[a])
             }
-            Input::Multiplier(a) => at(&quote!(mu), &[a]),
+            Input::Multiplier(a) => self.at(&quote!(mu), &[a]),
             Input::Control(name) => {
                 let place = self.inputs.iter().position(|own| own == name);
                 let place = Literal::usize_unsuffixed(place.unwrap_or_default());
@@ -98,7 +98,7 @@ impl Emitter<'_> {
             }
             Input::ParameterElement(name, a) => {
                 let field = identifier(name);
-                let element = at(&quote!(self.#field), &[a]);
+                let element = self.at(&quote!(self.#field), &[a]);
                 let first = self.places.get(name);
                 match first.and_then(|first| first.plus_scaled(a, 1)) {
                     Some(place) => {
