@@ -271,3 +271,17 @@ fn sums_stay_in_their_loops() {
     );
     check(5, 3, family, &written);
 }
+
+/// Of the third force the sum is empty, and begins beyond where it ends: nothing is carried from its first place to its last.
+#[test]
+fn ranges_that_forces_move_may_be_empty() {
+    let family = "coordinates(x[3], q[n]), lagrangian = sum(i in 0..3, dot(x[i])^2/2) + sum(i in 0..n, dot(q[i])^2/2), \
+        force(x[i]) = q[2]^2 + sum(j in i..w, (q[j+1] - q[j])^3)";
+    let written = format!(
+        "coordinates(x[3], q[5]), lagrangian = {} + {}, \
+         force(x[0]) = q[2]^2 + (q[1] - q[0])^3, force(x[1]) = q[2]^2, force(x[2]) = q[2]^2",
+        joined(0..3, |i| format!("dot(x[{i}])^2/2")),
+        joined(0..5, |i| format!("dot(q[{i}])^2/2")),
+    );
+    check(5, 1, family, &written);
+}

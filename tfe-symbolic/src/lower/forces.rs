@@ -3,8 +3,8 @@
 use super::{DotRule, Index, Lowerer, SHORT_SUM, Setting, Value};
 use crate::check::Symbol;
 use crate::diagnostic::{Kind, nearest};
-use crate::expr::graph::{ExprId, SumRange};
-use crate::expr::input::{Affine, Input};
+use crate::expr::graph::{ExprId, Node, SumRange};
+use crate::expr::input::{Affine, Input, LoopVariable};
 use crate::expr::sorting::sort;
 use crate::model::declared::{Force, Form};
 use crate::syntax::ast::{Expr, ExprKind};
@@ -165,8 +165,10 @@ impl Lowerer<'_> {
         let Some(value) = value else {
             return Vec::new();
         };
+        // Written out, ranges that the index moves would look like those that are checked before a run, of which none is empty.
+        let stays = self.is_of_run_time_length() && self.moves_a_range(value, variable);
         match range.end.as_constant() {
-            Some(length) if length.unsigned_abs() <= SHORT_SUM => (0..length)
+            Some(length) if length.unsigned_abs() <= SHORT_SUM && !stays => (0..length)
                 .filter_map(|at| {
                     let at = Affine::constant(at);
                     let value = self.graph.substitute_loop(value, variable, &at);
@@ -187,6 +189,17 @@ impl Lowerer<'_> {
                 }]
             }
         }
+    }
+
+    /// Whether the range of a sum in an expression depends on an index.
+    fn moves_a_range(&self, value: ExprId, variable: LoopVariable) -> bool {
+        let mut nodes = self.graph.reachable(&[value]).into_iter();
+        nodes.any(|id| match self.graph.node(id) {
+            Node::Loop { range, .. } => {
+                range.start.depends_on(variable) || range.end.depends_on(variable)
+            }
+            _ => false,
+        })
     }
 
     /// `dissipation = value`.
