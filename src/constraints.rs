@@ -204,20 +204,21 @@ fn consistent<M: Model<N>, const N: usize>(
         if !size.is_finite() {
             return Err(StepError::NonFinite.into());
         }
-        let settled = size <= 2.0 * f64::EPSILON * scale || (size >= last && size <= 1e-12 * scale);
-        if settled {
+        let is_stuck = size >= last && size <= 1e-12 * scale;
+        // What is nothing beside large coordinates may be much to small ones.
+        if is_stuck || (size <= 2.0 * f64::EPSILON * scale && hold(model, t, &q)) {
             break;
         }
         if iterations == MOST {
             return Err(ConsistentError::Unreached {
-                residuals: constrained::residuals(model, t, &q, &[0.0; N], 1.0),
+                residuals: constrained::start_residuals(model, t, &q, &[0.0; N], 1.0),
                 iterations,
             });
         }
         last = size;
     }
     let velocities = constrained::velocity_for(model, t, &q, &v)?;
-    let residuals = constrained::residuals(model, t, &q, &velocities, 1.0);
+    let residuals = constrained::start_residuals(model, t, &q, &velocities, 1.0);
     if residuals
         .iter()
         .any(|residual| !(residual.relative() <= constrained::START_TOLERANCE))
@@ -239,6 +240,13 @@ fn consistent<M: Model<N>, const N: usize>(
         velocity: distance(&velocities, &v),
         rank: independent.into_iter().filter(|one| *one).count(),
     })
+}
+
+/// Whether the holonomic constraints hold at a position, as far as a start must.
+fn hold<M: Model<N>, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> bool {
+    let residuals = constrained::start_residuals(model, t, q, &[0.0; N], 1.0);
+    let mut positions = residuals.iter().map(|one| one.relative_position);
+    positions.all(|position| position <= constrained::START_TOLERANCE)
 }
 
 /// One step of the projection: to the tangents of the constraints, and along them towards the given position. None without holonomic ones.

@@ -55,7 +55,7 @@ pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
         // The first element says why.
         return Ok(());
     };
-    let residuals = constrained::residuals(model, time, &start.q, &v, h);
+    let residuals = constrained::start_residuals(model, time, &start.q, &v, h);
     let holds = |one: &Residual| one.relative() <= constrained::START_TOLERANCE;
     if residuals.iter().all(holds) {
         Ok(())

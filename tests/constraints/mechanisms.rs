@@ -24,6 +24,45 @@ struct CarAxis {
     g: f64,
 }
 
+/// The same rod holds far above the ground as it does upon it: beside heights of 1e9 one that was too long by a tenth used to be taken.
+#[test]
+fn a_rod_holds_at_any_height() {
+    use tfe::runtime::constrained::{START_TOLERANCE, start_residuals};
+    let model = CarAxis {
+        k: 5e-4,
+        l0: 0.5,
+        r: 0.0,
+        omega: 10.0,
+        g: 1.0,
+    };
+    let at = |height: f64, right: f64| [0.0, height, right, height];
+    let off = |height: f64, right: f64, speed: f64| {
+        let v = [0.0, 0.0, speed, 0.0];
+        start_residuals(&model, 0.0, &at(height, right), &v, 0.01)[1].relative()
+    };
+    for height in [0.5, 1e3, 1e9, 1.5e11] {
+        for (right, speed) in [(1.1, 0.0), (1.0 - 1e-6, 0.0), (1.0, 0.01)] {
+            let off = off(height, right, speed);
+            assert!(off > START_TOLERANCE, "{height}, {right}, {speed}: {off:e}");
+        }
+        for right in [1.0, 1.0 + 1e-9, 1.0 - 1e-14] {
+            let off = off(height, right, 0.0);
+            assert!(off <= START_TOLERANCE, "{height}, {right}: {off:e}");
+        }
+    }
+    let long = model.state(at(1e9, 1.1), [0.0; 4]);
+    let run = Simulation::new(&model).step(0.01).run(long, 0.0..0.01);
+    let text = run.expect_err("the rod is too long").to_string();
+    // 1.1² − 1
+    assert!(text.contains("`axis` = 2.100e-1"), "{text}");
+    // Newton's method ends where the rod holds, not where its steps are nothing beside the height: 1e-5 was left.
+    let found = model
+        .consistent_state(at(1e13, 1.1), [0.0; 4])
+        .expect("a rod of length one is near");
+    let [left, _, right, _] = found.state.q;
+    assert!((right - left - 1.0).abs() < 1e-9, "{left} {right}");
+}
+
 #[test]
 fn the_car_axis() {
     let model = CarAxis {

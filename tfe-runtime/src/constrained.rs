@@ -14,6 +14,8 @@ pub(crate) mod layout;
 pub(crate) mod node;
 pub(crate) mod residual;
 pub(crate) mod rows;
+#[cfg(feature = "std")]
+mod start;
 #[cfg(feature = "alloc")]
 mod states;
 mod tangent;
@@ -25,6 +27,8 @@ pub use crate::control::START_TOLERANCE;
 pub use held_velocity::HeldVelocity;
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
+#[cfg(feature = "std")]
+pub use start::start_residuals;
 #[cfg(feature = "alloc")]
 pub use states::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
 #[cfg(feature = "alloc")]

@@ -27,7 +27,7 @@ pub(crate) fn relative_residual<const N: usize>(
 }
 
 /// |value| / scale; zero over zero is zero, NaN stays NaN.
-fn over(value: f64, scale: f64) -> f64 {
+pub(super) fn over(value: f64, scale: f64) -> f64 {
     if value == 0.0 {
         0.0
     } else {

@@ -17,9 +17,9 @@ pub struct Residual {
     pub position: f64,
     /// A v + a
     pub velocity: f64,
-    /// The distance |φ| / |A| relative to the positions.
+    /// The distance |φ| / |A| relative to the positions; of a start relative to what the constraint is made of, where that is more.
     pub relative_position: f64,
-    /// |A v + a| / |A| relative to the velocities.
+    /// |A v + a| / |A| relative to the velocities; of a start likewise.
     pub relative_velocity: f64,
 }
 
@@ -53,7 +53,7 @@ where
     residuals_of(model, t, (q, v), h)
 }
 
-fn residuals_of<const N: usize>(
+pub(super) fn residuals_of<const N: usize>(
     model: &dyn Constrains<N>,
     t: f64,
     (q, v): (&[f64; N], &[f64; N]),
