@@ -30,6 +30,43 @@ struct TwoBlades {
     gs: f64,
 }
 
+/// Two cranks, r and 2r long, on one slider.
+#[dynamics(
+    coordinates(x, a, b),
+    lagrangian = m/2*dot(x)^2 + m*r^2/2*(dot(a)^2 + dot(b)^2),
+    constraint(first) = x - r*cos(a),
+    constraint(second) = x - 2*r*sin(b),
+)]
+struct Cranks {
+    m: f64,
+    r: f64,
+}
+
+/// Lengths of 1e-11 m beside angles: both rows are (1, 0, 0) but for that, and one was left out in silence, so that the second crank went on by itself.
+#[test]
+fn short_cranks_are_two_conditions() {
+    let ends = [1.0, 1e-11].map(|r| {
+        let model = Cranks { m: 1.0, r };
+        let (a, rate) = (1.0_f64, 1.0);
+        let b = (0.5 * a.cos()).asin();
+        let v = [-r * a.sin() * rate, rate, -0.5 * a.sin() * rate / b.cos()];
+        let start = model.state([r * a.cos(), a, b], v);
+        let run = Simulation::new(&model).element(Mixed::<4>).step(0.01);
+        let motion = run.run(start, 0.0..2.0).expect("a run");
+        assert_eq!(motion.constraint_residual().rank, 2, "{r:e}");
+        for node in motion.states() {
+            let off = node.q[1].cos() - 2.0 * node.q[2].sin();
+            assert!(off.abs() < 1e-9, "{r:e}, t = {}: {off:e}", node.t);
+        }
+        motion.last().q
+    });
+    // The unit of length makes no difference but for roundings, 200 steps of them.
+    for k in 1..3 {
+        let off = ends[1][k] - ends[0][k];
+        assert!(off.abs() < 1e-9, "{off:e}");
+    }
+}
+
 #[test]
 fn two_equations_for_one_rod() {
     let (one, two) = (

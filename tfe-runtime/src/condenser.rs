@@ -13,6 +13,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::condense::{EndForces, System, phase_ends, velocity_ends};
+use crate::constrained::choose::choose;
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
 use crate::constrained::rows::Rows;
@@ -268,7 +269,7 @@ impl<const N: usize> Condenser<N> {
             }
             parts.momenta.fill(start.p);
             let mut rows = Rows::at_start(parts.rows, model, time, &start.q);
-            rows.choose(M::CONSTRAINTS, parts.active);
+            choose(&mut rows, model, (time, &start.q), parts.active);
             let mut form = ConstrainedForm::new(
                 VelocityForm {
                     model,

@@ -3,6 +3,7 @@
 //! Elements hold them exactly at their nodes; this module answers what belongs to one instant: the velocity of a constrained momentum,
 //! residuals, and which rows are independent.
 
+pub(crate) mod choose;
 mod combine;
 mod derivative;
 pub(crate) mod element;

@@ -1,5 +1,6 @@
 //! Steps of constrained models.
 
+use crate::constrained::choose::choose;
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
 use crate::constrained::layout::refused;
@@ -62,7 +63,7 @@ where
     if !warm {
         parts.active.fill(0);
     }
-    rows.choose(M::CONSTRAINTS, parts.active);
+    choose(&mut rows, method.model, (t, &state.q), parts.active);
     let mean = mean_rate(&scheme, parts.unknowns[..layout.rates()].as_chunks().0);
     combine(
         method.model,

@@ -1,7 +1,7 @@
 //! What constraints say at one instant of a motion: reactions, and the gradients that span what they allow.
 
 use crate::constrained::derivative::{DualRows, explicit};
-use crate::constrained::rows::{Constrains, dot, norm, rows_len, scaled};
+use crate::constrained::rows::{dot, norm, rows_len, scaled};
 use crate::constrained::states::chosen;
 use crate::dual::{Dual, duals};
 use crate::error::{ConstraintError, StepError};
@@ -41,12 +41,15 @@ where
     Ok(gradients_with(second, model, (t, &state.q, v)))
 }
 
-fn gradients_with<const N: usize>(
+fn gradients_with<M, const N: usize>(
     second: Second<f64, N>,
-    model: &dyn Constrains<N>,
+    model: &M,
     (t, q, v): (f64, &[f64; N], &[f64; N]),
-) -> Gradients<N> {
-    let mut memory = vec![0.0; rows_len(N, model.declared().len())];
+) -> Gradients<N>
+where
+    M: Model<N>,
+{
+    let mut memory = vec![0.0; rows_len(N, M::CONSTRAINTS.len())];
     let (mut rows, active) = chosen(model, (t, q), &mut memory);
     rows.differentiate(model, t, q, v);
     Gradients {

@@ -1,5 +1,6 @@
 //! What belongs to one state: the velocity of its momentum, independent rows, residuals.
 
+use super::choose::choose;
 use super::node::{Bordered, own_velocity, solve_velocity};
 use crate::constrained::residual::relative_residual;
 use crate::constrained::rows::{Constrains, Rows, rows_len};
@@ -82,27 +83,34 @@ pub fn independent<M, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> Vec<bo
 where
     M: Model<N>,
 {
-    independent_of(model, t, q)
-}
-
-fn independent_of<const N: usize>(model: &dyn Constrains<N>, t: f64, q: &[f64; N]) -> Vec<bool> {
-    let mut memory = vec![0.0; rows_len(N, model.declared().len())];
+    let mut memory = vec![0.0; rows_len(N, M::CONSTRAINTS.len())];
     let (_, active) = chosen(model, (t, q), &mut memory);
     active.into_iter().map(|mark| mark != 0).collect()
 }
 
 /// The rows at a position, and marks of those that are independent there; in memory of [`rows_len`] numbers.
-pub(super) fn chosen<'a, const N: usize>(
+pub(super) fn chosen<'a, M, const N: usize>(
+    model: &M,
+    (t, q): (f64, &[f64; N]),
+    memory: &'a mut [f64],
+) -> (Rows<'a, N>, Vec<usize>)
+where
+    M: Model<N>,
+{
+    let mut rows = evaluated(model, (t, q), memory);
+    let mut active = vec![0; M::CONSTRAINTS.len()];
+    choose(&mut rows, model, (t, q), &mut active);
+    (rows, active)
+}
+
+fn evaluated<'a, const N: usize>(
     model: &dyn Constrains<N>,
     (t, q): (f64, &[f64; N]),
     memory: &'a mut [f64],
-) -> (Rows<'a, N>, Vec<usize>) {
-    let declared = model.declared();
-    let mut rows = Rows::of(memory, declared.len());
+) -> Rows<'a, N> {
+    let mut rows = Rows::of(memory, model.declared().len());
     rows.evaluate(model, t, q);
-    let mut active = vec![0; declared.len()];
-    rows.choose(declared, &mut active);
-    (rows, active)
+    rows
 }
 
 /// The velocity that belongs to a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, the Legendre transform.

@@ -1,0 +1,109 @@
+//! Which rows are independent, in the units that the kinetic energy gives to coordinates where their lengths do not tell.
+
+use super::node::is_regular;
+use super::rows::{DEPENDENT, Rows, norm, scaled, subtract_part, unit};
+use crate::model::{Constraint, First, Form, Model};
+
+/// Below it what a dependent row has of its own is rounding.
+const NOISE: f64 = 1e-13;
+
+/// What a row has of its own in units of inertia, relative to the row, where it is told to be independent against what its length says.
+const CLEAR: f64 = 1e-6;
+
+/// As [`Rows::choose`], which takes all coordinates as they are: beside angles the lengths of 1e-11 m in `x - r*cos(a)` and `x - l*cos(b)` are so small that both rows seem to be the same. Where rows were left
+/// out that have more of their own than roundings, coordinates are measured in the square roots of their inertias.
+pub(crate) fn choose<M, const N: usize>(
+    rows: &mut Rows<'_, N>,
+    model: &M,
+    (t, q): (f64, &[f64; N]),
+    active: &mut [usize],
+) where
+    M: Model<N>,
+{
+    if const { M::CONSTRAINTS.is_empty() } {
+        return;
+    }
+    let rank = rows.choose(M::CONSTRAINTS, active);
+    if rank < active.len() && rows.has_left(active) {
+        choose_more(rows, model, (t, q), active);
+    }
+}
+
+#[cold]
+#[inline(never)]
+fn choose_more<M, const N: usize>(
+    rows: &mut Rows<'_, N>,
+    model: &M,
+    (t, q): (f64, &[f64; N]),
+    active: &mut [usize],
+) where
+    M: Model<N>,
+{
+    let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
+    model.first_and_mass(t, q, &[0.0; N], &mut first, &mut zz);
+    // Coordinates without an inertia of their own have no such unit.
+    if !is_regular(zz) {
+        return;
+    }
+    let mut units = [0.0; N];
+    for a in 0..N {
+        let root = crate::real::Real::sqrt(zz[a][a].abs());
+        units[a] = match M::FORM {
+            Form::Lagrangian => 1.0 / root,
+            Form::Hamiltonian => root,
+        };
+    }
+    if units.iter().all(|unit| unit.is_finite() && *unit > 0.0) {
+        rows.choose_in_units(M::CONSTRAINTS, &units, active);
+    }
+}
+
+impl<const N: usize> Rows<'_, N> {
+    /// Whether a row that was left out by the last choice has more of its own than roundings.
+    fn has_left(&self, active: &[usize]) -> bool {
+        let mut rows = self.spare.iter().zip(active);
+        rows.any(|(row, mark)| *mark == 0 && norm(row) > NOISE)
+    }
+
+    /// Marks more rows, those that are independent of the marked ones beyond doubt.
+    fn choose_in_units(&mut self, declared: &[Constraint], units: &[f64; N], active: &mut [usize]) {
+        for (spare, row) in self.spare.iter_mut().zip(&*self.rows) {
+            for a in 0..N {
+                spare[a] = row[a] * units[a];
+            }
+            let length = norm(spare);
+            *spare = if length > 0.0 {
+                scaled(spare, length)
+            } else {
+                [0.0; N]
+            };
+        }
+        // Marks: 0 left out, 1 chosen before, 2 taken away from the others.
+        for (open, holonomic, least) in [
+            (1, true, DEPENDENT),
+            (1, false, DEPENDENT),
+            (0, true, CLEAR),
+            (0, false, CLEAR),
+        ] {
+            loop {
+                let mut best = (least, None);
+                for (c, constraint) in declared.iter().enumerate() {
+                    let own = norm(&self.spare[c]);
+                    let is_open = active[c] == open && constraint.kind.is_holonomic() == holonomic;
+                    if is_open && own > best.0 {
+                        best = (own, Some(c));
+                    }
+                }
+                let Some(c) = best.1 else { break };
+                active[c] = 2;
+                let direction = unit(&self.spare[c]);
+                for other in self.spare.iter_mut() {
+                    subtract_part(other, &direction);
+                }
+            }
+        }
+        for mark in active.iter_mut() {
+            *mark = usize::from(*mark != 0);
+        }
+    }
+}
