@@ -163,11 +163,16 @@ impl<'a, M: Model> Along<'a, M> {
     }
 }
 
-/// Whether constraints are not needed to tell velocities: pivots are small only beside their columns, which carry the units of their coordinates.
+/// Whether constraints are not needed to tell velocities: pivots are small only beside their columns, which carry the units of their coordinates, and beside what was subtracted on the
+/// way to them, because rows carry these units, too.
 fn is_regular(factors: &LU<f64, Dyn, Dyn>) -> bool {
-    let u = factors.u();
-    let mut columns = u.column_iter().enumerate();
-    columns.all(|(a, column)| u[(a, a)].abs() > 1e-10 * column.amax())
+    const SINGULAR: f64 = 1e-10;
+    let (l, u) = (factors.l(), factors.u());
+    (0..u.ncols()).all(|a| {
+        let pivot = u[(a, a)].abs();
+        let subtracted = || -> f64 { (0..a).map(|k| (l[(a, k)] * u[(k, a)]).abs()).sum() };
+        pivot > SINGULAR * u.column(a).amax() || pivot > SINGULAR * subtracted()
+    })
 }
 
 fn duals(values: &[f64], slopes: &[f64]) -> Vec<Dual> {
@@ -175,4 +180,21 @@ fn duals(values: &[f64], slopes: &[f64]) -> Vec<Dual> {
     pairs
         .map(|(value, slope)| Dual::new(*value, *slope))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masses_are_regular_in_any_units() {
+        let regular = |entries: [f64; 4]| is_regular(&DMatrix::from_row_slice(2, 2, &entries).lu());
+        for length in [1.0, 1e-6, 1e-11, 1e-14, 1e-20, 1e11] {
+            // A body of one with a pendulum of a half, and the pendulum alone, whose bob and angle move alike.
+            let (turned, square) = (0.5 * length, 0.5 * length * length);
+            assert!(regular([1.5, turned, turned, square]), "{length}");
+            assert!(regular([square, turned, turned, 1.5]), "{length}");
+            assert!(!regular([0.5, turned, turned, square]), "{length}");
+        }
+    }
 }
