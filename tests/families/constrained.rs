@@ -199,6 +199,30 @@ fn starts_off_the_constraints_are_refused() {
     );
 }
 
+/// Beside a support at 1e9 m rods of a metre were taken with errors of up to ten metres.
+#[test]
+fn rods_far_from_the_origin_have_their_lengths() {
+    let far = 1e9;
+    let model = Rods { a: far, ..rods() };
+    let (mut q, _) = start();
+    for x in &mut q[..4] {
+        *x += far;
+    }
+    // The support stands there, at the end of its way.
+    let begin = std::f64::consts::FRAC_PI_2;
+    let outcome = |q: [f64; 8]| {
+        let run = Simulation::new(&model).step(1e-6);
+        let motion = run.run(model.state(q, [0.0; 8]), begin..begin + 1e-6);
+        motion.map_or_else(|error| error.to_string(), |_| String::new())
+    };
+    // What the start is rounded by is no violation.
+    let text = outcome(q);
+    assert!(!text.contains("violates"), "{text}");
+    q[3] += 0.1;
+    let text = outcome(q);
+    assert!(text.contains("`rod[2]`: position off by"), "{text}");
+}
+
 #[test]
 fn what_cannot_hold_constraints_is_refused() {
     let (model, (q, v)) = (rods(), start());

@@ -40,6 +40,8 @@ mod rows;
 mod running;
 mod scale;
 mod space;
+#[cfg(feature = "sparse")]
+mod start;
 mod stepper;
 #[cfg(feature = "sparse")]
 mod tangent;

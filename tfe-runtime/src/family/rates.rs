@@ -17,6 +17,7 @@ use super::node::Node;
 use super::pattern::Pattern;
 use super::point::Point;
 use super::rows::Rows;
+use super::start::violated;
 use super::tangent::Parts;
 use crate::constrained::element::slopes;
 use crate::control::START_TOLERANCE;
@@ -188,7 +189,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
                 self.low.q.fill(0.0);
                 self.low.p.fill(0.0);
                 self.begin(t)?;
-                self.check_start(h)?;
+                self.check_start(t, h)?;
             }
         }
         let outcome = self.newton(t, h);
@@ -241,7 +242,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
     }
 
     /// Refuses a start that is not on the constraints.
-    fn check_start(&mut self, h: f64) -> Result<(), StepError> {
+    fn check_start(&mut self, t: f64, h: f64) -> Result<(), StepError> {
         if self.constraints == 0 || !self.refuses {
             return Ok(());
         }
@@ -261,6 +262,11 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             if !(distance <= START_TOLERANCE * extent || distance == 0.0) {
                 return refused(row, true, distance / extent);
             }
+        }
+        let at = (t, &self.start.q[..]);
+        let least = self.control.with_constraints().tolerance * extent;
+        if let Some((row, part)) = violated(&*self.model, at, &self.rows, least) {
+            return refused(row, true, part);
         }
         // The velocity that constraints leave has another momentum where the start does not keep them.
         let off = self.start.p.iter().zip(&self.node.slope);

@@ -15,7 +15,7 @@ pub(super) struct Rows {
     /// φ
     pub(super) phi: Vec<f64>,
     /// a = ∂φ/∂t
-    drift: Vec<f64>,
+    pub(super) drift: Vec<f64>,
 }
 
 impl Rows {
