@@ -1,7 +1,7 @@
 //! What constraints say at one instant of a motion: reactions, and the gradients that span what they allow.
 
 use crate::constrained::derivative::{DualRows, explicit};
-use crate::constrained::rows::{dot, norm, rows_len, scaled};
+use crate::constrained::rows::{dot, norm, rows_len, scaled, scaled_norm};
 use crate::constrained::states::chosen;
 use crate::dual::{Dual, duals};
 use crate::error::{ConstraintError, StepError};
@@ -131,6 +131,9 @@ fn balance<const N: usize>(
 /// Lengths whose squares, and products of these, are numbers with all digits.
 const ORDINARY: core::ops::Range<f64> = 1e-70..1e70;
 
+/// Rows whose lengths differ by no more have products that lose nothing beside one another.
+const ALIKE: f64 = 1e6;
+
 /// The multipliers of all rows with the least Σ λ² that give the same Aᵀλ as those of the independent ones.
 fn spread<const N: usize>(
     rows: &[[f64; N]],
@@ -141,9 +144,14 @@ fn spread<const N: usize>(
     if rank == rows.len() {
         return Ok(multipliers.to_vec());
     }
-    // Rows over their lengths where products of these are no numbers; else over one.
+    // Rows over their lengths where products of these are no numbers, or stand beside much larger ones; else over one.
     let mut lengths: Vec<f64> = rows.iter().map(norm).collect();
-    let is_ordinary = (lengths.iter()).all(|length| *length == 0.0 || ORDINARY.contains(length));
+    let (mut shortest, mut longest) = (f64::INFINITY, 0.0_f64);
+    for length in lengths.iter().filter(|length| **length != 0.0) {
+        (shortest, longest) = (shortest.min(*length), longest.max(*length));
+    }
+    let is_ordinary = longest <= ALIKE * shortest
+        && (lengths.iter()).all(|length| *length == 0.0 || ORDINARY.contains(length));
     for length in &mut lengths {
         if is_ordinary || *length == 0.0 {
             *length = 1.0;
@@ -178,17 +186,81 @@ fn spread<const N: usize>(
             }
         }
     }
-    let mut weights = multipliers.to_vec();
-    lu::factor(rank, &mut normal, &mut pivots).map_err(|_| StepError::NonFinite)?;
-    lu::solve(rank, &normal, &pivots, &mut weights);
-    let all = combinations.iter().map(|combination| {
-        let parts = combination.iter().zip(&weights);
-        parts.map(|(c, w)| c * w).sum::<f64>()
-    });
-    let all: Vec<f64> = all.collect();
+    let is_lost = lu::factor(rank, &mut normal, &mut pivots).is_err()
+        || (0..rank).any(|column| lu::is_lost(rank, &normal, column, LOST));
+    let all = if is_lost {
+        least(combinations, multipliers)
+    } else {
+        let mut weights = multipliers.to_vec();
+        lu::solve(rank, &normal, &pivots, &mut weights);
+        let all = combinations.iter().map(|combination| {
+            let parts = combination.iter().zip(&weights);
+            parts.map(|(c, w)| c * w).sum::<f64>()
+        });
+        all.collect()
+    };
     if all.iter().all(|value| value.is_finite()) {
         Ok(all)
     } else {
         Err(StepError::NonFinite)
+    }
+}
+
+/// Pivots of CᵀC below this part of what was subtracted on the way to them have lost digits: the squares of rows of different scales stand beside one another there.
+const LOST: f64 = 1e-4;
+
+/// The least λ with Cᵀλ = μ by C = Q R, λ = Q R⁻ᵀ μ: no squares.
+#[cold]
+#[inline(never)]
+fn least(mut combinations: Vec<Vec<f64>>, multipliers: &[f64]) -> Vec<f64> {
+    // Twice is enough for orthogonality to rounding where lengths are alike; rows of different scales lose digits in the first pass.
+    const PASSES: usize = 3;
+    let mut weights = multipliers.to_vec();
+    for column in 0..weights.len() {
+        for _ in 0..PASSES {
+            for before in 0..column {
+                let parts = combinations.iter().map(|row| row[before] * row[column]);
+                let part: f64 = parts.sum();
+                for row in &mut combinations {
+                    row[column] -= part * row[before];
+                }
+                weights[column] -= part * weights[before];
+            }
+        }
+        let length = scaled_norm(combinations.iter().map(|row| row[column]));
+        for row in &mut combinations {
+            row[column] /= length;
+        }
+        weights[column] /= length;
+    }
+    let sums = combinations.iter().map(|row| {
+        let parts = row.iter().zip(&weights);
+        parts.map(|(q, weight)| q * weight).sum::<f64>()
+    });
+    sums.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// x = 0, y = 0 and s (x + y) = 0 under the forces 1 and 3: λ₃ = 4s/(1 + 2s²), λ₁ = 1 − s λ₃, λ₂ = 3 − s λ₃.
+    #[test]
+    fn rows_of_any_scale_share_a_load() {
+        for s in [1e-12, 1e-3, 1.0, 30.0, 1e3, 1e6, 1e7, 1e8, 1e12] {
+            let rows = [[1.0, 0.0], [0.0, 1.0], [s, s]];
+            let found = spread(&rows, &[0, 1], &[1.0, 3.0]).expect("independent rows");
+            // 4s²/(1 + 2s²)
+            let third = 4.0 / (1.0 / (s * s) + 2.0);
+            let off = [
+                found[0] - (1.0 - third),
+                found[1] - (3.0 - third),
+                s * found[2] - third,
+            ];
+            for off in off {
+                // Below the scale 30 squares lose three digits.
+                assert!(off.abs() < 1e-12, "{s:e}: {off:e}");
+            }
+        }
     }
 }
