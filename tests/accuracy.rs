@@ -44,7 +44,7 @@ fn true_error<const N: usize>(motion: &Motion<N>, (q, p): ([f64; N], [f64; N])) 
             .map(|(a, b)| (a - b).abs());
         off.fold(0.0, larger) / size
     };
-    of(&q, |node| &node.q).max(of(&p, |node| &node.p))
+    larger(of(&q, |node| &node.q), of(&p, |node| &node.p))
 }
 
 fn at_end<T>(motion: &Estimated<T>) -> f64 {
@@ -210,9 +210,10 @@ fn what_was_picked_makes_the_same_motion() {
     assert_eq!(again.states().len(), motion.states().len());
     assert_eq!(again.statistics().newton_iterations, 0);
     let (first, second) = (again.last(), motion.last());
-    let apart = (first.q[0] - second.q[0])
-        .abs()
-        .max((first.p[0] - second.p[0]).abs());
+    let apart = larger(
+        (first.q[0] - second.q[0]).abs(),
+        (first.p[0] - second.p[0]).abs(),
+    );
     // What iterations leave is far below what is asked.
     assert!(apart <= 1e-9, "{apart:e}");
     // What does not iterate is solved as the simulation says.
@@ -581,10 +582,10 @@ fn families_know_their_errors_too() {
     let error = |node: &tfe::family::Node| {
         let largest = |a: &[f64], b: &[f64]| {
             let pairs = a.iter().zip(b);
-            pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+            pairs.fold(0.0, |most, (a, b)| larger(most, (a - b).abs()))
         };
         let q = largest(&node.q, &fine.last().q) / size_q;
-        q.max(largest(&node.p, &fine.last().p) / size_p)
+        larger(q, largest(&node.p, &fine.last().p) / size_p)
     };
     for accuracy in [1e-4, 1e-8, 1e-11] {
         let motion = Simulation::new(&chain)

@@ -250,9 +250,10 @@ fn scenes() -> Vec<Scene<'static>> {
 }
 
 fn apart(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len());
     a.iter()
         .zip(b)
-        .fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()))
+        .fold(0.0, |most, (a, b)| larger(most, (a - b).abs()))
 }
 
 /// Cut at kinks, elements keep their order; across them all have the first or second.

@@ -1,5 +1,9 @@
 //! What runs with an accuracy say about their own error.
 
+#[path = "common/largest.rs"]
+mod largest;
+
+use largest::larger;
 use tfe::prelude::*;
 use tfe::runtime::Model;
 use tfe::runtime::length::{Declared, FixedLength};
@@ -64,15 +68,17 @@ fn rows<'a, M, const N: usize>(
         let last = motion.motion().last().state();
         let largest = |part: fn(&tfe::Node<N>) -> &[f64; N]| {
             let numbers = motion.motion().states().iter().flat_map(part);
-            numbers.fold(0.0_f64, |most, x| most.max(x.abs()))
+            numbers.fold(0.0, |most, x| larger(most, x.abs()))
         };
         let off = |a: &[f64; N], b: &[f64; N]| {
             a.iter()
                 .zip(b)
-                .fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()))
+                .fold(0.0, |most, (a, b)| larger(most, (a - b).abs()))
         };
-        let error = (off(&last.q, &exact.q) / largest(|node| &node.q))
-            .max(off(&last.p, &exact.p) / largest(|node| &node.p));
+        let error = larger(
+            off(&last.q, &exact.q) / largest(|node| &node.q),
+            off(&last.p, &exact.p) / largest(|node| &node.p),
+        );
         let (_, estimate) = motion.error_estimates().last().expect("an estimate");
         assert!(motion.error_estimate() <= accuracy, "{name} {accuracy:e}");
         assert!(error <= accuracy, "{name} {accuracy:e}: {error:.1e}");

@@ -112,7 +112,7 @@ fn largest_error(element: Element, elements: usize, below_a: f64) -> f64 {
             let f = |a: f64| trace(a, q, element, elements).unwrap().abs() - 2.0;
             let error = (boundary(value - room, value + room, f) - value).abs();
             println!("{element} q = {q}, {name}: {error:.1e}");
-            largest = largest.max(error);
+            largest = larger(largest, error);
         }
     }
     largest

@@ -1,5 +1,9 @@
 //! Steps that are short where the motion is fast, and runs over given nodes.
 
+#[path = "common/largest.rs"]
+mod largest;
+
+use largest::larger;
 use tfe::prelude::*;
 use tfe::{RunErrorKind, accuracy::Estimated};
 
@@ -14,7 +18,7 @@ const STIFF: VanDerPol = VanDerPol { mu: 1000.0 };
 const STIFF_END: (f64, f64) = (1.706_167_732_170_483, -0.892_809_701_024_797_5e-3);
 
 fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
-    numbers.fold(0.0, |most, x| most.max(x.abs()))
+    numbers.fold(0.0, |most, x| larger(most, x.abs()))
 }
 
 /// The error at the end as it is estimated: over the largest coordinate and the largest momentum of the motion.
@@ -22,7 +26,7 @@ fn true_error(motion: &Motion<1>, (q, p): (f64, f64)) -> f64 {
     let states = || motion.states().iter();
     let off_q = (motion.last().q[0] - q).abs() / largest(states().map(|node| node.q[0]));
     let off_p = (motion.last().p[0] - p).abs() / largest(states().map(|node| node.p[0]));
-    off_q.max(off_p)
+    larger(off_q, off_p)
 }
 
 fn steps(motion: &Motion<1>) -> usize {
@@ -34,7 +38,7 @@ fn extremes(motion: &Motion<1>) -> (f64, f64) {
     let nodes = motion.states().windows(2);
     let lengths = nodes.map(|pair| (pair[1].t - pair[0].t).abs());
     lengths.fold((f64::INFINITY, 0.0), |(least, most), length| {
-        (f64::min(least, length), f64::max(most, length))
+        (f64::min(least, length), larger(most, length))
     })
 }
 
@@ -97,7 +101,7 @@ fn equations_of_first_order_have_them_too() {
             motion
                 .states()
                 .iter()
-                .map(|node| node.q[0].abs().max(node.q[1].abs())),
+                .map(|node| larger(node.q[0].abs(), node.q[1].abs())),
         );
         let off = (motion.last().q[0] - STIFF_END.0).abs() / largest;
         assert!(off <= accuracy, "{accuracy:e}: {off:.1e}");

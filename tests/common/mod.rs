@@ -94,8 +94,10 @@ pub fn assert_close(actual: &[f64], expected: &[f64], tolerance: f64, what: &str
     }
 }
 
-/// The largest difference of two lists.
+/// The largest difference of two lists of equal length.
+#[track_caller]
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
+    assert_eq!(a.len(), b.len(), "{a:?} {b:?}");
     a.iter()
         .zip(b)
         .map(|(a, b)| (a - b).abs())
@@ -105,9 +107,13 @@ pub fn distance(a: &[f64], b: &[f64]) -> f64 {
 /// The slope of log(error) against log(step) by least squares, over the points above `floor`.
 ///
 /// # Panics
-/// Unless three points are above the floor: fewer say nothing about an order.
+/// Unless three points are above the floor: fewer say nothing about an order. And where an error is no number.
 #[track_caller]
 pub fn observed_order(points: &[(f64, f64)], floor: f64, what: &str) -> f64 {
+    assert!(
+        points.iter().all(|(_, error)| error.is_finite()),
+        "{what}: {points:?}"
+    );
     let usable: Vec<(f64, f64)> = points
         .iter()
         .filter(|(_, error)| *error > floor)

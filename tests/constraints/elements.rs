@@ -1,6 +1,6 @@
 //! Which elements run constrained models, by either function, and what lies between nodes.
 
-use crate::common::{distance, observed_order};
+use crate::common::{distance, larger, observed_order};
 use crate::models::{KnifeEdge, RodPendulum};
 use crate::runs::{differences, run};
 use tfe::prelude::*;
@@ -162,8 +162,8 @@ fn between_nodes() {
                 let t = f64::from(k) / 37.0;
                 let (a, b) = (motion.at(t).expect("inside"), fine.at(t).expect("inside"));
                 worst = (
-                    worst.0.max(distance(&a.q, &b.q)),
-                    worst.1.max(distance(&a.p, &b.p)),
+                    larger(worst.0, distance(&a.q, &b.q)),
+                    larger(worst.1, distance(&a.p, &b.p)),
                 );
             }
             worst

@@ -1,6 +1,6 @@
 //! Runs that must not fail, and their errors.
 
-use crate::common::distance;
+use crate::common::{distance, larger};
 use tfe::prelude::*;
 
 /// The motion from `start` over `0..time`.
@@ -35,6 +35,9 @@ pub fn differences<const N: usize>(one: &Motion<N>, other: &Motion<N>) -> (f64, 
         .iter()
         .zip(other.states())
         .fold((0.0, 0.0), |(q, p): (f64, f64), (a, b)| {
-            (q.max(distance(&a.q, &b.q)), p.max(distance(&a.p, &b.p)))
+            (
+                larger(q, distance(&a.q, &b.q)),
+                larger(p, distance(&a.p, &b.p)),
+            )
         })
 }

@@ -94,9 +94,8 @@ fn off<const N: usize>(motion: &Motion<N>, exact: &Motion<N>) -> f64 {
     let (a, b) = (motion.last(), exact.last());
     let (mut off, mut scale) = (0.0_f64, 0.0_f64);
     for k in 0..N {
-        off = off
-            .max((a.q[k] - b.q[k]).abs())
-            .max((a.p[k] - b.p[k]).abs());
+        off = larger(off, (a.q[k] - b.q[k]).abs());
+        off = larger(off, (a.p[k] - b.p[k]).abs());
         scale = scale.max(b.q[k].abs()).max(b.p[k].abs());
     }
     off / scale

@@ -1,8 +1,11 @@
 //! Ensembles give what single runs give, for every start, whatever happens to the others.
 
 mod going_on;
+#[path = "../common/largest.rs"]
+mod largest;
 mod parameter_sets;
 
+use largest::larger;
 use std::sync::Mutex;
 use tfe::ensemble::EnsembleError;
 use tfe::prelude::*;
@@ -83,7 +86,7 @@ fn fractions(count: usize) -> impl Iterator<Item = f64> {
 fn distance<const N: usize>(a: &Node<N>, b: &Node<N>) -> f64 {
     let (mut worst, mut scale) = (0.0_f64, 0.0_f64);
     for (x, y) in a.q.iter().chain(&a.p).zip(b.q.iter().chain(&b.p)) {
-        worst = worst.max((x - y).abs());
+        worst = larger(worst, (x - y).abs());
         scale = scale.max(y.abs());
     }
     worst / scale

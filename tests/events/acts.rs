@@ -1,6 +1,7 @@
 //! What is done at events, in all kinds of runs; and what is misused.
 
 use super::*;
+use crate::largest::larger;
 
 #[test]
 fn a_run_that_records_has_the_same_bits() {
@@ -367,7 +368,7 @@ fn accuracy_is_met_across_events() {
             .states()
             .iter()
             .fold(0.0_f64, |m, node| m.max(node.p[0].abs()));
-        ((a.q[0] - b.q[0]).abs() / 1.5).max((a.p[0] - b.p[0]).abs() / p)
+        larger((a.q[0] - b.q[0]).abs() / 1.5, (a.p[0] - b.p[0]).abs() / p)
     };
     for accuracy in [1e-4, 1e-6, 1e-9] {
         let motion = simulation

@@ -3,6 +3,8 @@
 mod acts;
 mod clear;
 mod derivatives;
+#[path = "../common/largest.rs"]
+mod largest;
 mod meeting;
 mod near;
 #[path = "../../examples/events_beside_scans.rs"]

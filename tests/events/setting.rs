@@ -1,6 +1,7 @@
 //! Parameters that events set: what runs are compared by, and matrices where the values depend on the state.
 
 use super::*;
+use crate::largest::larger;
 use tfe::periodic::OrbitError;
 use tfe::sensitivity::Loss;
 
@@ -70,9 +71,10 @@ fn estimates_of_outputs_are_those_of_the_parameters_set() {
         assert_eq!(motion.last().t < end, stops);
         let outputs = motion.outputs();
         let found = outputs.column("potential").expect("an output");
-        let mut off = 0.0_f64;
+        let mut off = 0.0;
+        assert_eq!(motion.states().len(), found.len());
         for (node, found) in motion.states().iter().zip(&found) {
-            off = off.max((found - potential(node.t)).abs());
+            off = larger(off, (found - potential(node.t)).abs());
         }
         let off = off / (speed * speed / 2.0);
         let estimate = motion.error_estimate_of("potential").expect("an output");

@@ -1,5 +1,6 @@
 //! Steps of models of run-time length that are cut where forces have kinks and jumps.
 
+use crate::common::larger;
 use tfe::prelude::*;
 use tfe::runtime::StepError;
 use tfe::{RunErrorKind, Warning};
@@ -205,7 +206,7 @@ fn accuracies_are_met_across_kinks() {
         let run = Simulation::new(&long).accuracy(accuracy);
         let run = run.run(start(), 0.0..5.0).expect("a run");
         let off = run.last().q.iter().zip(&fine.last().q);
-        let off = off.fold(0.0, |off: f64, (a, b)| off.max((a - b).abs()));
+        let off = off.fold(0.0, |off, (a, b)| larger(off, (a - b).abs()));
         assert!(off < accuracy && run.error_estimate() < accuracy, "{off:e}");
         assert!(run.statistics().kinks > 3 && run.warnings().is_empty());
     }

@@ -571,8 +571,7 @@ fn conservative_orbits_are_those_of_fixed_size() {
     assert!((one.period() - other.period()).abs() < 1e-10);
     assert!(one.motion().constraint_residual().position < 1e-13);
     // Two pairs, one of them trivial and known to the root of roundings.
-    let angles =
-        |orbit: &[Complex<f64>]| orbit.iter().map(|one| one.arg().abs()).fold(0.0, f64::max);
+    let angles = |orbit: &[Complex<f64>]| orbit.iter().map(|one| one.arg().abs()).fold(0.0, larger);
     assert_eq!((one.multipliers().len(), one.trivial().len()), (4, 2));
     assert!((angles(one.multipliers()) - angles(other.multipliers())).abs() < 1e-8);
     for name in ["m", "s", "g", "l"] {

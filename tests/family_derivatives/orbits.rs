@@ -223,9 +223,10 @@ fn linear_chains_have_a_closed_form() {
     let amplitude = stiffness.lu().solve(&force).expect("regular");
     for a in 0..n {
         let (q, p) = (amplitude[a].re, -omega * amplitude[a].im);
-        let off = (orbit.start().q[a] - q)
-            .abs()
-            .max((orbit.start().p[a] - p).abs());
+        let off = larger(
+            (orbit.start().q[a] - q).abs(),
+            (orbit.start().p[a] - p).abs(),
+        );
         // Order ten: (ω_max h)¹⁰ is 10⁻⁵, with a small factor, for the fastest modes, which move little.
         assert!(off < 1e-10, "{a}: {off:e}");
     }

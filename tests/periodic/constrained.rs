@@ -1,5 +1,6 @@
 //! Orbits of constrained models against those of their twins in minimal coordinates.
 
+use crate::common::larger;
 use std::f64::consts::{PI, TAU};
 use tfe::AssemblyError;
 use tfe::boundary::BoundaryError;
@@ -138,7 +139,7 @@ fn a_free_swing() {
         .states()
         .iter()
         .map(|node| node.q[1])
-        .fold(-1.0, f64::max);
+        .fold(-1.0, larger);
     assert!((highest + amplitude.cos()).abs() < 1e-6, "{highest}");
     assert_eq!(orbit.multipliers().len(), 2);
     for multiplier in orbit.multipliers() {

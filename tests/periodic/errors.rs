@@ -1,5 +1,6 @@
 //! What makes no sense, or has no solution, is a typed error.
 
+use crate::common::larger;
 use crate::models::{Duffing, Pendulum, Projectile, VanDerPol};
 use std::f64::consts::{PI, TAU};
 use tfe::boundary::{BoundaryError, Component};
@@ -180,7 +181,7 @@ fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
             match near(amplitude, period) {
                 Ok(orbit) => {
                     let nodes = orbit.motion().states().iter();
-                    let largest = nodes.map(|node| node.q[0].abs()).fold(0.0, f64::max);
+                    let largest = nodes.map(|node| node.q[0].abs()).fold(0.0, larger);
                     assert!(largest > 1.9, "{mu} {amplitude:e}: {largest:e}");
                 }
                 Err(error) => assert_eq!(error, OrbitError::AtRest, "{mu} {amplitude:e}"),
@@ -192,7 +193,7 @@ fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
             if let Ok(orbit) = orbit {
                 let nodes = orbit.nodes();
                 let largest = nodes.iter().map(|node| node.q[0].abs());
-                let largest = largest.fold(0.0, f64::max);
+                let largest = largest.fold(0.0, larger);
                 assert!(largest > 1.9, "{mu} {amplitude:e}: {largest:e}");
             }
         }

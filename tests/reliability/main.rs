@@ -1,8 +1,11 @@
 //! Runs where it hurts: what ends `Ok` is right, or says that it is doubtful.
 
 mod checkpoints;
+#[path = "../common/largest.rs"]
+mod largest;
 mod steppers;
 
+use largest::larger;
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};
 use tfe::{RunErrorKind, Warning};
@@ -476,10 +479,10 @@ fn a_tolerance_is_what_an_element_leaves() {
                 for tolerance in [1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-15] {
                     let node = step(tolerance);
                     let off = |one: [f64; 2], other: [f64; 2]| {
-                        let off = (one[0] - other[0]).abs().max((one[1] - other[1]).abs());
+                        let off = larger((one[0] - other[0]).abs(), (one[1] - other[1]).abs());
                         off / size(other)
                     };
-                    let off = off(node.q, exact.q).max(off(node.p, exact.p));
+                    let off = larger(off(node.q, exact.q), off(node.p, exact.p));
                     assert!(
                         off <= tolerance + ROUNDINGS,
                         "{element} {solve:?} {tolerance:e}: {off:e}"

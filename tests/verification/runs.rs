@@ -269,9 +269,7 @@ fn impulses_back_in_time_are_undone() {
             let back = run.run(forth.last().state(), 1.0..0.0).expect("a run");
             let end = back.last();
             for a in 0..N {
-                let off = (end.q[a] - start.q[a])
-                    .abs()
-                    .max((end.p[a] - start.p[a]).abs());
+                let off = larger((end.q[a] - start.q[a]).abs(), (end.p[a] - start.p[a]).abs());
                 assert!(off < by, "{element} {inside}: {off:e}");
             }
         }
