@@ -111,7 +111,8 @@ fn examine<M: Model<N>, const N: usize>(
         count.needless += u32::from(off < 0.01 * way);
         return;
     }
-    if off > 0.5 * way {
+    // An end that is no number is wrong, too.
+    if !(off <= 0.5 * way) {
         count.wrong += 1;
         println!(
             "wrong: {element}, h = {h:.3} from {start:?}: {:?} for {:?}",

@@ -103,7 +103,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut shown = Vec::new();
     for sample in [0.005, 0.02, 0.05, 0.1, 0.15, 0.2] {
         let rows = controlled(sample)?;
-        let largest = rows.iter().map(|[_, _, u]| u.abs()).fold(0.0, f64::max);
+        let forces = rows.iter().map(|[_, _, u]| u.abs());
+        let largest = forces.max_by(f64::total_cmp).unwrap_or(f64::NAN);
         let fell = rows.last().is_none_or(|[t, ..]| *t < END);
         let away = rows.iter().rev().find(|[_, tip, _]| tip.abs() > 0.01);
         let back = match away {

@@ -83,6 +83,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             );
             points.push((step, error));
         }
+        let (order, claimed) = (order(&points), element.order() as f64);
+        println!("{:<26}  order {order:.2}", element.to_string());
+        assert!(
+            (order - claimed).abs() < 0.5,
+            "{element}: order {order:.2}, not {claimed}"
+        );
         curves.push(Curve { element, points });
     }
 
@@ -100,6 +106,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     chart(curves).save(path)?;
     println!("\nchart: {path}");
     Ok(())
+}
+
+/// The slope of log(error) over log(step) between the last two errors that are far above the digits of the reference; NaN where there are none.
+fn order(points: &[(f64, f64)]) -> f64 {
+    let above = |(_, error): &(f64, f64)| !(*error <= 1e-10);
+    let points: Vec<(f64, f64)> = points.iter().copied().filter(above).collect();
+    points.last_chunk::<2>().map_or(f64::NAN, |[coarse, fine]| {
+        (coarse.1 / fine.1).ln() / (coarse.0 / fine.0).ln()
+    })
 }
 
 fn elements() -> Vec<Element> {

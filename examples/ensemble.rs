@@ -146,8 +146,10 @@ where
         for (end, single) in in_lanes.iter().zip(&single) {
             let end = end.as_ref().map_err(Clone::clone)?;
             for a in 0..N {
-                difference = difference.max((end.q[a] - single.q[a]).abs());
-                difference = difference.max((end.p[a] - single.p[a]).abs());
+                let off = [end.q[a] - single.q[a], end.p[a] - single.p[a]].map(f64::abs);
+                // `max` would drop a NaN.
+                assert!(!off[0].is_nan() && !off[1].is_nan(), "{end:?}");
+                difference = difference.max(off[0]).max(off[1]);
             }
         }
     }

@@ -193,5 +193,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     println!("{tally:?}");
-    Ok(())
+    match tally.missed + tally.invented {
+        0 => Ok(()),
+        wrong => Err(format!("{wrong} events are missed or invented").into()),
+    }
 }

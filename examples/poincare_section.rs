@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut chart = Chart::new(format!("Hénon and Heiles' section, E = {name}"))
             .x(Axis::new("y"))
             .y(Axis::new("py"));
-        let (mut fastest, mut worst, mut count) = (0.0_f64, 0.0_f64, 0);
+        let (mut fastest, mut worst, mut count) = (0.0, 0.0_f64, 0);
         let starts: Vec<_> = STARTS
             .iter()
             .filter_map(|one| start(energy, *one))
@@ -76,19 +76,23 @@ fn main() -> Result<(), Box<dyn Error>> {
                 direction /= direction.norm();
                 let ([x, y], [px, py]) = (point.q, point.p);
                 let now = (px * px + py * py + x * x + y * y) / 2.0 + x * x * y - y.powi(3) / 3.0;
-                worst = worst.max((now - energy).abs());
+                let off = (now - energy).abs();
+                assert!(off < 1e-10, "E = {name}: the energy is off by {off:e}");
+                worst = worst.max(off);
                 end = point.t;
                 points.push((y, py));
             }
+            assert_eq!(points.len(), POINTS, "E = {name}, start {}", k + 1);
             count += points.len();
-            fastest = fastest.max(stretch / end);
+            let exponent: f64 = stretch / end;
+            assert!(exponent.is_finite(), "E = {name}, start {}", k + 1);
+            fastest = exponent.max(fastest);
             chart = chart.series(format!("start {}", k + 1), Style::Markers, points);
         }
         println!(
             "{energy:6.4}   {:6}   {count:6}   {fastest:25.4}   {worst:13.1e}",
             starts.len()
         );
-        assert!(worst < 1e-10);
         chaos.push(fastest);
         chart.save(format!("{path}_{}.svg", number + 1))?;
     }

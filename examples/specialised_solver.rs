@@ -73,7 +73,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (k, (element, bytes)) in names.into_iter().enumerate() {
         let per_step = |time: Duration| time.as_secs_f64() * 1e9 / STEPS as f64;
         let [a, b] = ends[k];
-        let difference = (a.q[0] - b.q[0]).abs().max((a.q[1] - b.q[1]).abs());
+        let difference = (a.q[0] - b.q[0]).hypot(a.q[1] - b.q[1]);
         println!(
             "{:<12} {bytes:>8} {:>14.0} {:>14.0} {:>7.2} {difference:>10.0e}",
             element.to_string(),

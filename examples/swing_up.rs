@@ -56,18 +56,18 @@ fn swung_up(elements: usize) -> Result<Optimum<2>, Box<dyn Error>> {
     Ok(best)
 }
 
-/// By how much the energy gained is not the work, and the momentum not the impulse, at the worst of the nodes.
+/// By how much the energy gained is not the work, and the momentum not the impulse, at the worst of the nodes. By `total_cmp` a NaN is worse than all numbers.
 fn defects(best: &Optimum<2>) -> Result<[f64; 2], Box<dyn Error>> {
     let (motion, driven) = (best.motion(), best.steered(&CART));
     let work = motion.integral(&driven, "power")?;
     let impulse = motion.integral(&driven, "force")?;
-    let mut worst = [0.0_f64; 2];
-    for (k, node) in motion.states().iter().enumerate() {
-        let gained = motion.energies()[k] - motion.energies()[0];
-        worst[0] = worst[0].max((gained - work[k]).abs());
-        worst[1] = worst[1].max((node.p[0] - impulse[k]).abs());
-    }
-    Ok(worst)
+    let energies = motion.energies();
+    let lost = (energies.iter().zip(&work)).map(|(e, work)| (e - energies[0] - work).abs());
+    let kicked =
+        (motion.states().iter().zip(&impulse)).map(|(node, push)| (node.p[0] - push).abs());
+    let lost = lost.max_by(f64::total_cmp).ok_or("no node")?;
+    let kicked = kicked.max_by(f64::total_cmp).ok_or("no node")?;
+    Ok([lost, kicked])
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -84,8 +84,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             best.iterations(),
             best.cost()
         );
-        assert!(momentum < 1e-12);
-        assert!(elements < 40 || off < 1e-6);
+        assert!(momentum < 1e-12, "{momentum:e} N s");
+        assert!(elements < 40 || off < 1e-6, "{off:e}");
+        // The force gives and takes some ten joules. Of them 80 elements leave less than a millionth, with order six.
+        assert!(elements < 80 || energy < 1e-4, "{energy:e} J");
     }
     let at = |t: f64| finest.motion().at(t);
     let mut largest = (0.0, 0.0_f64);

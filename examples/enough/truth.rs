@@ -35,13 +35,14 @@ impl<const N: usize> Truth<N> {
         })
     }
 
-    /// The larger relative error of coordinates and momenta at the end.
+    /// The larger relative error of coordinates and momenta at the end; NaN if one is, which is the largest by `total_cmp`.
     pub fn error(&self, end: &Node<N>) -> f64 {
         let largest = |a: &[f64; N], b: &[f64; N]| {
-            let pairs = a.iter().zip(b);
-            pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()))
+            let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+            apart.max_by(f64::total_cmp).unwrap_or(f64::NAN)
         };
         let q = largest(&end.q, &self.last.q) / self.sizes.0;
-        q.max(largest(&end.p, &self.last.p) / self.sizes.1)
+        let p = largest(&end.p, &self.last.p) / self.sizes.1;
+        if q.is_nan() || q >= p { q } else { p }
     }
 }

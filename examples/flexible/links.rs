@@ -163,7 +163,7 @@ fn same_motion() -> Result<f64, Box<dyn Error>> {
         .iter()
         .zip(&other.last().q)
         .map(|(one, other)| (one - other).abs());
-    let apart = apart.fold(0.0, f64::max);
+    let apart = apart.max_by(f64::total_cmp).unwrap_or(f64::NAN);
     println!(
         "eight links for two units of time: angles and rods apart by {apart:.1e}, energy errors {:.1e} and {:.1e}",
         one.energy_error(),

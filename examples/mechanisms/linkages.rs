@@ -291,6 +291,7 @@ pub fn spatial_four_bar() -> Outcome {
         "planar linkage",
     );
     let rank = run.motion.constraint_residual().rank;
+    assert_eq!(rank, 5, "six coordinates that move in one way");
     let joint = |q: &[f64; 6]| (seen([q[0], q[1], q[2]]), seen([q[3], q[4], q[5]]));
     let (start, end) = (seen([0.0; 3]), seen([d, 0.0, 0.0]));
     let samples = run.samples(81)?;

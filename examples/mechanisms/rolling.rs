@@ -67,6 +67,10 @@ pub fn coin() -> Outcome {
     // Its heading is driven by large multipliers, and swings fast.
     let other = Run::of(&vakonomic, Mixed::<6>, 0.002, start, end)?;
     let apart = other.error(&exact[..2]);
+    assert!(
+        apart > 0.01,
+        "the vakonomic path is that of the coin: {apart:e} m"
+    );
 
     let across = |x: f64, y: f64| (y, -x);
     // Upright, seen from above.
@@ -150,6 +154,10 @@ pub fn disk() -> Outcome {
     let error = run.error(&finer.motion.last().q);
     let row = run.row("rolling disk", Energy::Conserved, error, "finer run");
     let found = critical_speed(&model)?;
+    assert!(
+        (found / limit - 1.0).abs() < 1e-4,
+        "{found} m/s for {limit}"
+    );
 
     let rim = |q: &[f64; 5]| {
         vec![Part::Outline(

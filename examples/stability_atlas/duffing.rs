@@ -33,12 +33,16 @@ pub fn scene() -> Outcome {
         curves.push((force, resonance(force)?));
     }
     let (backbone, backbone_error) = backbone()?;
+    // Order ten with 40 elements: what iterations leave.
+    assert!(backbone_error < 1e-10, "{backbone_error:e}");
     let wells = Wells::new()?;
     let rows = curves
         .iter()
         .flat_map(|(force, branch)| fold_rows(*force, branch));
     let points: usize = curves.iter().map(|(_, branch)| branch.points().len()).sum();
     let doubling = &wells.doubling.point;
+    let passing = critical(&doubling.multipliers, -1.0);
+    assert!((passing + 1.0).norm() < 1e-5, "{passing} passes −1");
     let next = wells.double.events_of(EventKind::PeriodDoubling).next();
     let next = next.map_or_else(String::new, |next| {
         format!(", and doubles again at F = {:.9}", next.point.parameter)
@@ -73,8 +77,7 @@ pub fn scene() -> Outcome {
                 "α = −1, β = 1, δ = 0.3, ω = 1.2: oscillations in one of two wells. At F = \
                  {:.9} a multiplier passes −1 (here {:.9}): the response of the period of the \
                  force goes on unstable, one of twice the period takes over{next}.",
-                doubling.parameter,
-                critical(&doubling.multipliers, -1.0).re
+                doubling.parameter, passing.re
             ),
         );
     let folds = curves
@@ -115,7 +118,7 @@ fn resonance(force: f64) -> Result<Branch<Duffing, 1>, Box<dyn Error>> {
 
 /// (frequency, amplitude) of free oscillations by their energy, and the largest relative error of a period.
 fn backbone() -> Result<(Points, f64), Box<dyn Error>> {
-    let (mut points, mut worst) = (Vec::new(), 0.0_f64);
+    let (mut points, mut errors) = (Vec::new(), Vec::new());
     for amplitude in grid(0.05, 2.9, 58) {
         let a2 = amplitude * amplitude;
         let rough = (1.0 + 0.75 * a2).sqrt();
@@ -128,10 +131,11 @@ fn backbone() -> Result<(Points, f64), Box<dyn Error>> {
                 ([amplitude * cos], [-amplitude * rough * sin])
             })
             .solve()?;
-        worst = worst.max((orbit.period() / free_period(amplitude) - 1.0).abs());
+        errors.push((orbit.period() / free_period(amplitude) - 1.0).abs());
         points.push((TAU / orbit.period(), amplitude));
     }
-    Ok((points, worst))
+    let worst = errors.into_iter().max_by(f64::total_cmp);
+    Ok((points, worst.ok_or("no orbit")?))
 }
 
 /// T = 4K(k)/√(1 + A²), k² = A²/(2 + 2A²), by the arithmetic–geometric mean.

@@ -52,6 +52,12 @@ pub fn scene() -> Outcome {
     let (map, picture) = resonance()?;
     let orbit = bouncing()?;
     let difference = (orbit.multiplier - orbit.by_map).abs();
+    // Order 14 with 40 elements: what iterations leave.
+    assert!(
+        difference < 1e-9 && orbit.period_error.abs() < 1e-9,
+        "{difference:e} {:e}",
+        orbit.period_error
+    );
     let rows = sweeps.iter().map(|(element, points)| {
         let failed = points.iter().filter(|point| !point.1.is_finite()).count();
         [
