@@ -89,7 +89,7 @@ fn boundary(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
 /// The largest distance of a boundary of stability from a characteristic value, of those below `below_a` that the trace tells at all.
 fn largest_error(element: Element, elements: usize, below_a: f64) -> f64 {
     let table = reference("periodic");
-    let mut largest: f64 = 0.0;
+    let (mut largest, mut compared): (f64, usize) = (0.0, 0);
     for case in cases(&table, "mathieu_characteristic") {
         let q = number(&case["q"]);
         let mut values: Vec<(String, f64)> = case["values"]
@@ -113,8 +113,10 @@ fn largest_error(element: Element, elements: usize, below_a: f64) -> f64 {
             let error = (boundary(value - room, value + room, f) - value).abs();
             println!("{element} q = {q}, {name}: {error:.1e}");
             largest = larger(largest, error);
+            compared += 1;
         }
     }
+    assert!(compared > 5, "{compared}");
     largest
 }
 

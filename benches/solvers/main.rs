@@ -96,14 +96,15 @@ fn measure(scene: &Scene, counts: bool, times: bool) -> Result<[Option<Figures>;
     Ok(figures)
 }
 
-/// The largest difference over the largest coordinate.
+/// The largest difference over the largest coordinate; NaN where there is one.
 fn error(end: &[f64], reference: &[f64]) -> f64 {
     let size = reference.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
     let difference = |(x, y): (&f64, &f64)| (x - y).abs();
     end.iter()
         .zip(reference)
         .map(difference)
-        .fold(0.0, f64::max)
+        .max_by(f64::total_cmp)
+        .unwrap_or(f64::NAN)
         / size
 }
 

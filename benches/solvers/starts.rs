@@ -127,7 +127,9 @@ fn show<const N: usize>(
     let mut difference = 0.0_f64;
     for (x, y) in ends[1].iter().zip(&ends[2]) {
         for a in 0..N {
-            difference = difference.max((x[a] - y[a]).abs());
+            let off = (x[a] - y[a]).abs();
+            assert!(!off.is_nan(), "{name}: {x:?} {y:?}");
+            difference = difference.max(off);
         }
     }
     println!(

@@ -309,7 +309,7 @@ fn ours(is_backwards: bool, known: &Gradient) -> Vec<Way<'_>> {
 fn error(found: &Gradient, known: &Gradient) -> f64 {
     let largest = known.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let apart = found.iter().zip(known).map(|(a, b)| (a - b).abs());
-    apart.fold(0.0, |most, x| if x <= most { most } else { x }) / largest
+    apart.max_by(f64::total_cmp).unwrap_or(f64::NAN) / largest
 }
 
 /// The seconds and the error of a way that has not failed.

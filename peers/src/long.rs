@@ -93,13 +93,13 @@ fn error(q: &[f64], v: &[f64], known: &FamilyNode) -> f64 {
             .zip(other)
             .map(|(one, other)| (one - other).abs());
         // A NaN is the largest of all.
-        differences.fold(0.0, |most, x| if x <= most { most } else { x })
+        differences.max_by(f64::total_cmp).unwrap_or(f64::NAN)
     };
     let (q, v) = (
         apart(q, &known.q) / largest(&known.q),
         apart(v, &known.p) / largest(&known.p),
     );
-    if q >= v { q } else { v }
+    if q.is_nan() || q >= v { q } else { v }
 }
 
 fn ours<'w>(fput: &'w Fput, begin: &'w FamilyState, known: &'w FamilyNode) -> Vec<Way<'w>> {

@@ -262,6 +262,8 @@ where
     ///     let node = node?;
     ///     if node.q[0] < 0.0 {
     ///         println!("passed zero before t = {}", node.t);
+    ///         // At π/2, between two steps.
+    ///         assert!((node.t - 1.6).abs() < 1e-12);
     ///         break;
     ///     }
     /// }

@@ -1,7 +1,7 @@
 //! A four-bar linkage with equal cranks, through the flat position where its constraints lose rank: there the parallelogram could fold into
 //! its mirror image, and only the motion up to there says that it does not.
 
-use crate::common::larger;
+use crate::common::{distance, larger};
 use crate::runs::run;
 use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
@@ -73,16 +73,14 @@ pub fn error(motion: &Motion<3>, step: f64, angle: f64, rate: f64) -> f64 {
         ONE_ANGLE.state([angle], [rate]),
         end,
     );
+    assert_eq!(motion.states().len(), exact.states().len());
     motion
         .states()
         .iter()
         .zip(exact.states())
         .map(|(node, exact)| {
             let angle = exact.q[0];
-            (node.q[0] - angle)
-                .abs()
-                .max((node.q[2] - angle).abs())
-                .max(node.q[1].abs())
+            distance(&node.q, &[angle, 0.0, angle])
         })
         .fold(0.0, larger)
 }

@@ -192,7 +192,7 @@ fn steps_that_do_not_resolve_a_driven_motion_are_told() {
             };
             let off = (motion.last().q[0] - fine.last().q[0]).abs();
             told += u32::from(is_unresolved(&motion));
-            if off > way / 5.0 {
+            if !(off <= way / 5.0) {
                 wrong += 1;
                 assert!(
                     !motion.warnings().is_empty(),
@@ -217,7 +217,7 @@ fn long_steps_that_keep_the_energy_are_told() {
             continue;
         };
         let off = |a: usize| (motion.last().q[a] - fine.last().q[a]).abs();
-        if off(0) + off(1) > 2.0 {
+        if !(off(0) + off(1) <= 2.0) {
             wrong += 1;
             assert!(is_unresolved(&motion), "from {start:?}");
         }
@@ -408,6 +408,7 @@ fn endless_steps_end_at_breaks() {
 /// Force 1 before t = 0.5, none after: x(1) = 3/8, whichever side the model counts the break to, and back again.
 #[test]
 fn forces_at_breaks_are_those_of_the_element() {
+    let mut met = 0;
     for (h, late) in [
         (0.1, 0.0),
         (0.1, 1.0),
@@ -440,9 +441,12 @@ fn forces_at_breaks_are_those_of_the_element() {
                     "{element}, h = {h}, {late}: back to {:?}",
                     back.last()
                 );
+                met += 1;
             }
         }
     }
+    // Of 120, among which there may be elements that are none.
+    assert!(met > 90, "{met}");
 }
 
 #[test]

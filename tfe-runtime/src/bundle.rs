@@ -81,9 +81,11 @@ pub use varied::Varied;
 /// for step in 0..10 {
 ///     bundle.advance(0.1 * step as f64, 0.1);
 /// }
-/// for lane in 0..3 {
+/// let energy = |state: &State<1>| 0.5 * state.p[0] * state.p[0] - state.q[0].cos();
+/// for (lane, start) in starts.iter().enumerate() {
 ///     let end = bundle.state(lane)?;
 ///     println!("{:.6}", end.q[0]);
+///     assert!((energy(&end) - energy(start)).abs() < 1e-10);
 /// }
 /// # Ok(())
 /// # }

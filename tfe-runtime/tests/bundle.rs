@@ -49,6 +49,7 @@ fn together<M: Model<N>, const N: usize, const W: usize>(
 fn difference<const N: usize>(a: &State<N>, b: &State<N>) -> f64 {
     let (mut worst, mut scale) = (0.0_f64, 0.0_f64);
     for (x, y) in a.q.iter().chain(&a.p).zip(b.q.iter().chain(&b.p)) {
+        assert!(!x.is_nan() && !y.is_nan(), "{a:?} {b:?}");
         worst = worst.max((x - y).abs());
         scale = scale.max(y.abs());
     }

@@ -223,9 +223,10 @@ fn on_wire(model: &Wire, t: f64, x: f64, speed: f64) -> State<2> {
 fn largest_difference<const N: usize>(a: &State<N>, b: &State<N>) -> f64 {
     let mut largest = 0.0_f64;
     for i in 0..N {
-        largest = largest
-            .max((a.q[i] - b.q[i]).abs())
-            .max((a.p[i] - b.p[i]).abs());
+        for off in [a.q[i] - b.q[i], a.p[i] - b.p[i]] {
+            assert!(!off.is_nan(), "{a:?} {b:?}");
+            largest = largest.max(off.abs());
+        }
     }
     largest
 }

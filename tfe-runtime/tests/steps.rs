@@ -210,6 +210,7 @@ fn defect(a: &[f64; 16]) -> f64 {
                     sum += a[k * 4 + i] * skew(k, l) * a[l * 4 + j];
                 }
             }
+            assert!(!sum.is_nan(), "entry ({i}, {j})");
             worst = worst.max(sum.abs());
         }
     }
