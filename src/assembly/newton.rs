@@ -14,6 +14,7 @@ use super::constraints;
 use super::control::Control;
 use super::convergence::{Convergence, Size, sizes};
 use super::error::AssemblyError;
+use crate::numbers::larger;
 use tfe_runtime::condenser::{Condensed, Condenser, Direction, Placed};
 use tfe_runtime::{Element, ElementError, LegendreError, Model, State, Statistics};
 
@@ -397,7 +398,8 @@ impl<const N: usize> Assembly<N> {
         let (mut value, mut change) = (0.0_f64, 0.0_f64);
         for (new, old) in corrected.interiors.iter().zip(&iterate.interiors) {
             value = value.max(new.abs());
-            change = change.max((new - old).abs());
+            // `f64::max` would drop a NaN.
+            change = larger(change, (new - old).abs());
         }
         if change == 0.0 { 0.0 } else { change / value }
     }

@@ -196,7 +196,7 @@ mod tests {
             (0..8 * count)
                 .map(|k| f64::from(k) / f64::from(8 * count))
                 .map(|t| (table.at(t) - (3.0 * t).sin()).abs())
-                .fold(0.0, f64::max)
+                .fold(0.0, crate::numbers::larger)
         };
         // The ends, which are extrapolated, let it begin a little higher.
         let order = (error(256) / error(512)).log2();

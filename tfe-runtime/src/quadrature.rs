@@ -302,7 +302,9 @@ mod tests {
                 sum = sum.plus(term);
             }
             let exact = DoubleDouble::ONE.over(DoubleDouble::integer(m + 1));
-            worst = worst.max(sum.minus(exact).magnitude());
+            let off = sum.minus(exact).magnitude();
+            assert!(off.is_finite(), "{m}: {off}");
+            worst = worst.max(off);
         }
         worst
     }

@@ -326,8 +326,11 @@ mod tests {
             let lanes = Lanes([x, -x, 0.5 * x, 1e-3 * x]);
             let (sin, cos) = (Real::sin(lanes), Real::cos(lanes));
             for lane in 0..4 {
-                worst = worst.max(units(sin.0[lane], exact(lanes.0[lane], 0.0)));
-                worst = worst.max(units(cos.0[lane], exact(lanes.0[lane], 1.0)));
+                for (found, quarters) in [(sin.0[lane], 0.0), (cos.0[lane], 1.0)] {
+                    let off = units(found, exact(lanes.0[lane], quarters));
+                    assert!(off.is_finite(), "{}: {found}", lanes.0[lane]);
+                    worst = worst.max(off);
+                }
             }
         };
         for k in 0..10_000 {

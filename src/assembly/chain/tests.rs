@@ -1,6 +1,7 @@
 //! Chains against dense algebra and against manufactured solutions.
 
 use super::*;
+use crate::numbers::larger;
 use nalgebra::{DMatrix, DVector, Matrix2};
 use std::f64::consts::TAU;
 
@@ -133,7 +134,7 @@ fn assert_close(found: &[f64], expected: &[f64], tolerance: f64) {
     let error = found
         .iter()
         .zip(expected)
-        .fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        .fold(0.0, |most, (a, b)| larger(most, (a - b).abs()));
     assert!(error <= tolerance, "{found:?} ≠ {expected:?} by {error:e}");
 }
 

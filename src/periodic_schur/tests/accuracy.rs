@@ -69,7 +69,8 @@ fn products_of_rotations_lie_on_the_unit_circle() {
         let tolerance = 100.0 * n as f64 * (m as f64).sqrt() * f64::EPSILON;
         let most = found
             .iter()
-            .fold(0.0f64, |most, x| most.max(x.log_modulus.abs()));
+            .map(|x| x.log_modulus.abs())
+            .fold(0.0, crate::numbers::larger);
         assert!(most < tolerance, "n = {n}, m = {m}: {most:e}");
         // The determinant, which is the sign of the product.
         let sign: f64 = factors
