@@ -139,6 +139,7 @@ fn all_modes_together_move_as_the_full_model() {
     let full = full.run(start, 0.0..20.0).unwrap();
     let motion = Simulation::new(&modal).element(Mixed::<9>).step(0.05);
     let motion = motion.run(reduced, 0.0..20.0).unwrap();
+    assert_eq!(motion.states().len(), full.states().len());
     for (one, all) in motion.states().iter().zip(full.states()) {
         let one = modal.expand(&one.state());
         for (a, b) in one.q.iter().chain(&one.p).zip(all.q.iter().chain(&all.p)) {

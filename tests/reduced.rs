@@ -190,6 +190,7 @@ fn a_top_without_its_cyclic_angles_nods_as_the_whole() {
     let reduced = reduced.run(left, span).expect("a motion");
     let [phi, psi] =
         ["phi_rate", "psi_rate"].map(|rate| reduced.integral(&nutation, rate).expect("recorded"));
+    assert_eq!(whole.states().len(), reduced.states().len());
     let energies = whole.energies().iter().zip(reduced.energies());
     for (whole, reduced) in energies {
         // The Routhian keeps the energy as a whole.

@@ -320,6 +320,7 @@ fn an_output_called_energy_has_the_column_of_that_name() {
     let mut lines = text.lines();
     let header = "tau,x,y,t,x_dot,y_dot,t_dot,p_x,p_y,p_t,energy_,energy";
     assert_eq!(lines.next(), Some(header));
+    assert_eq!(text.lines().count(), 1 + motion.states().len());
     let outputs = motion.outputs().column("energy").expect("declared");
     for ((line, energy), output) in lines.zip(motion.energies()).zip(outputs) {
         let row: Vec<f64> = line

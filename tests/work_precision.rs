@@ -106,6 +106,7 @@ fn the_computed_reference_is_that_of_the_table() {
     );
     let given = problem().reference_end(end.q, end.p).run().unwrap();
     assert!(matches!(given.reference(), Reference::Given { .. }));
+    assert_eq!(computed.points().count(), given.points().count());
     for (a, b) in computed.points().zip(given.points()) {
         let (a, b) = (a.measured().unwrap(), b.measured().unwrap());
         // The scales differ: the largest state of ten, or of start and end. Both momenta are within a factor two.

@@ -143,6 +143,7 @@ fn a_ball_joint_holds_a_body() {
         joined.reactions().names(),
         &["unit", "ball[0]", "ball[1]", "ball[2]"]
     );
+    assert_eq!(joined.states().len(), fixed.states().len());
     for (a, b) in joined.states().iter().zip(fixed.states()) {
         assert_close(&a.q[3..], &b.q, 1e-9, &format!("t = {}", a.t));
     }

@@ -348,6 +348,7 @@ fn spans_of_all_kinds() {
     let ends = ensemble.run(&starts, 0.0..1.0).expect("a good plan");
     let there: Vec<_> = ends.nodes().map(Node::state).collect();
     let back = ensemble.run(&there, 1.0..0.0).expect("a good plan");
+    assert_eq!(back.nodes().count(), starts.len());
     for (start, end) in starts.iter().zip(back.nodes()) {
         // Time-reversible: only rounding of a hundred steps is left.
         assert!((start.q[0] - end.q[0]).abs() <= 1e-13 && end.p[0].abs() <= 1e-13);
@@ -355,6 +356,7 @@ fn spans_of_all_kinds() {
     let empty = ensemble
         .run(&starts, 2.0..2.0)
         .expect("an empty span is none to fail in");
+    assert_eq!(empty.nodes().count(), starts.len());
     for (start, end) in starts.iter().zip(empty.nodes()) {
         assert_eq!((end.t, end.state()), (2.0, *start));
     }

@@ -421,6 +421,7 @@ fn ensembles_meet_the_events_of_single_runs() {
     let single = Simulation::new(&BALL)
         .step(0.07)
         .on("height", Crossing::Falling, bounce);
+    assert_eq!(ends.nodes().count(), starts.len());
     for (start, end) in starts.iter().zip(ends.nodes()) {
         let motion = single.run(*start, 0.0..1.5).expect("a run");
         // Velocities are looked for from that of another node, and may differ by a rounding.

@@ -127,6 +127,7 @@ fn an_input_is_what_a_formula_of_time_is() {
             let written = Simulation::new(&written).element(element).step(0.05);
             let a = given.run(start(), 0.0..end).expect("a run");
             let b = written.run(start(), 0.0..end).expect("a run");
+            assert_eq!(a.states().len(), b.states().len());
             for (a, b) in a.states().iter().zip(b.states()) {
                 assert_alike(&a.q, &b.q, 1e-12);
                 assert_alike(&a.v, &b.v, 1e-12);

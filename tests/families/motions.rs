@@ -49,6 +49,7 @@ fn a_chain_moves_as_the_same_model_of_fixed_size() {
             let fixed = simulation
                 .run(five.state(START, PUSH), 0.0..end)
                 .expect("a run");
+            assert_eq!(family.states().len(), fixed.states().len());
             for (one, other) in family.states().iter().zip(fixed.states()) {
                 for j in 0..5 {
                     // Some hundred roundings of numbers of size one.
@@ -110,6 +111,7 @@ fn a_long_step_after_a_short_one_starts_as_that_of_fixed_size() {
                 .nodes(times.iter().copied())
                 .run(five.state(START, PUSH), 0.0..end);
             let fixed = fixed.expect("a run");
+            assert_eq!(family.states().len(), fixed.states().len());
             for (one, other) in family.states().iter().zip(fixed.states()) {
                 let off = (0..5).map(|j| (one.q[j] - other.q[j]).abs());
                 let off = off.fold(0.0, larger);

@@ -188,6 +188,7 @@ fn a_reference_of_ones_own_is_taken() {
     let end = measure(problem().reference_end(q, p));
     for given in [&function, &end] {
         assert!(matches!(given.reference(), Reference::Given { .. }));
+        assert_eq!(computed.points().count(), given.points().count());
         for (one, other) in computed.points().zip(given.points()) {
             let (one, other) = (one.error().unwrap(), other.error().unwrap());
             // At three quarters of a turn the momentum is as large as it gets; the scales are those of start and end.
@@ -197,6 +198,7 @@ fn a_reference_of_ones_own_is_taken() {
             );
         }
     }
+    assert_eq!(computed.points().count(), function.points().count());
     for (one, other) in computed.points().zip(function.points()) {
         let (one, other) = (one.measured().unwrap(), other.measured().unwrap());
         // Some hundred roundings.

@@ -345,6 +345,7 @@ fn unit_quaternions_have_the_velocities_and_derivatives_of_fixed_size() {
         let motion = ours.run(of_heap(&start), 0.0..0.8).expect("a run");
         let other = theirs.run(start, 0.0..0.8).expect("a run");
         let mut seen = Seen::NOTHING;
+        assert_eq!(motion.states().len(), other.states().len());
         for (node, other) in motion.states().iter().zip(other.states()) {
             seen.see(&node.v, &other.v);
             seen.see(&long.velocity(node.t, &node.state()), &other.v);

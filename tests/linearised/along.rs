@@ -123,6 +123,7 @@ fn matrices_along_a_motion_are_those_of_single_steps() {
                 .step(0.1)
                 .run_linearised(start, span.clone())
                 .expect("a run");
+            assert_eq!(run.motion().states().len(), run.transitions().len() + 1);
             for (node, a) in run.motion().states().iter().zip(run.transitions()) {
                 let single =
                     stability::transition_matrix(&model, element, &node.state(), node.t, h)

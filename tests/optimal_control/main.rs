@@ -227,6 +227,7 @@ fn an_optimum_is_a_run() {
         .input("u", |t| best.input("u", t).expect("an input"))
         .run(CART.state([0.0, 0.0], [0.0, 0.0]), 0.0..2.0)
         .expect("a run");
+    assert_eq!(run.states().len(), best.motion().states().len());
     for (own, other) in run.states().iter().zip(best.motion().states()) {
         for a in 0..2 {
             assert!((own.q[a] - other.q[a]).abs() < 1e-10 && (own.p[a] - other.p[a]).abs() < 1e-10);

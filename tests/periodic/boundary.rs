@@ -155,6 +155,7 @@ fn an_assembled_initial_value_problem_is_stepping() {
                 .step(0.2)
                 .run(start, 0.0..10.0)
                 .expect("a run");
+            assert_eq!(assembled.nodes().len(), stepped.states().len());
             for (one, other) in assembled.nodes().iter().zip(stepped.states()) {
                 for a in 0..2 {
                     assert!((one.q[a] - other.q[a]).abs() < 5e-14, "{element:?}");

@@ -84,6 +84,7 @@ fn both_folds_of_a_hardening_resonance() {
     let (coarse, fine) = (response(40), response(80));
     assert_eq!(kinds(&coarse), [EventKind::Fold, EventKind::Fold]);
     assert_eq!(coarse.end(), Some(End::Range));
+    assert_eq!(kinds(&fine), kinds(&coarse));
     for (coarse, fine) in coarse.events().iter().zip(fine.events()) {
         // Eighth order: 2π/40 to the eighth is 4e-7, with the small constant of five nodes below 1e-11.
         close(coarse.point.parameter, fine.point.parameter, 1e-10);
@@ -124,6 +125,7 @@ fn orbits_of_a_branch_are_those_solved_one_by_one() {
         // Newton's tolerance, times the sensitivity near folds.
         close(alone.start().q[0], point.start.q[0], 1e-11);
         close(alone.start().p[0], point.start.p[0], 1e-11);
+        assert_eq!(alone.multipliers().len(), orbit.multipliers().len());
         for (one, other) in alone.multipliers().iter().zip(orbit.multipliers()) {
             close((one - other).norm(), 0.0, 1e-10);
         }
