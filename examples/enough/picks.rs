@@ -79,6 +79,16 @@ pub fn measure<M: Model<N>, const N: usize>(
                 seconds: least_seconds(|| accurate.run(truth.start, span.clone()).is_ok()),
                 best,
             });
+        // An estimate is never below half of the error. Where nothing is optimised the truth has few steps, and is not known as well.
+        if let Ok(run) = &outcome
+            && !cfg!(debug_assertions)
+        {
+            assert!(
+                run.error <= 2.0 * asked,
+                "{:.1e} for {asked:.0e}",
+                run.error
+            );
+        }
         picks.push(Pick { asked, outcome });
     }
     Ok(picks)

@@ -118,7 +118,13 @@ fn by_accuracy(
     let start = MODEL.state(START.q, START.v);
     let error = |node: &Node<1>| {
         let error_q = (node.q[0] - q[0]).abs() / 2.0;
-        error_q.max((node.p[0] / p[0] - 1.0).abs())
+        let error_p = (node.p[0] / p[0] - 1.0).abs();
+        // A NaN is the largest of all.
+        if error_q.is_nan() || error_q >= error_p {
+            error_q
+        } else {
+            error_p
+        }
     };
     let mut rows = Vec::new();
     for target in CHOSEN {
