@@ -1,4 +1,4 @@
-//! Runs: a model, an element, a step, a span.
+//! Simulations: integrate a model over a time span with a chosen element and step size.
 
 mod accurate;
 mod acting;

@@ -150,7 +150,8 @@ fn check_accuracy(accuracy: f64) -> Result<(), RunErrorKind> {
     }
 }
 
-/// A run to be that picks its element and its step; made by [`Simulation::accuracy`](crate::Simulation::accuracy).
+/// A simulation that chooses its element and its step size to meet a given accuracy; made by
+/// [`Simulation::accuracy`](crate::Simulation::accuracy).
 #[derive(Clone, Debug)]
 pub struct Accurate<S> {
     simulation: S,
@@ -167,7 +168,8 @@ impl<S> Accurate<S> {
         }
     }
 
-    /// Forbids steps that vary, as models that are conservative and do not depend on time never have: all steps are equal then, between breaks.
+    /// Forbids variable step sizes: all steps between breaks are then equal. Conservative models that do not depend on
+    /// time always have equal steps.
     ///
     /// ```
     /// use tfe::prelude::*;

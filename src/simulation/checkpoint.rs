@@ -69,11 +69,15 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Goes on where a run ended, up to the time `end`.
+    /// Continues a run from its end, given as a checkpoint, up to the time `end`.
     ///
-    /// Where that run ended on the grid of this one (its start, and the same steps and breaks), the motion is to the last bit what one run would have been from there on; else the grid
-    /// begins at the checkpoint. Impulses at the very time of the checkpoint have acted already, unless this is where the run began, and are taken away where the run goes back; those on models of
-    /// run-time length act now. Another element begins anew, and so does a model with other parameters, lengths or lists, from the coordinates and momenta.
+    /// If the earlier run ended on the grid of this one (same start of the span, same steps and breaks), the
+    /// continuation has the same bits as one single run; otherwise the grid of steps begins at the checkpoint. With
+    /// another element, or a model with other parameters, lengths or lists, the run starts afresh from the coordinates
+    /// and momenta of the checkpoint.
+    ///
+    /// Impulses exactly at the time of the checkpoint have acted already, unless the earlier run began there; a run
+    /// backwards in time subtracts them. Impulses on models of run-time length act now.
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -12,9 +12,11 @@ use std::ops::Deref;
 use std::sync::Arc;
 use tfe_runtime::{CoordinateName, Statistics};
 
-/// A run that goes on step by step, made by [`Simulation::hold`](crate::Simulation::hold).
+/// A run step by step, in which inputs can be set between the steps; made by
+/// [`Simulation::hold`](crate::Simulation::hold).
 ///
-/// An input keeps what it was [set](Self::set) to over the steps that follow: zero-order hold. No step of a model of fixed size allocates memory.
+/// An input keeps the value it was [set](Self::set) to over the following steps (zero-order hold). Steps of models of
+/// fixed size allocate no memory.
 #[derive(Debug)]
 pub struct Held<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     steps: Steps<'m, Driven<'m, M, L>, N, L>,
@@ -47,7 +49,7 @@ impl<const N: usize, L: Length<N>> fmt::Debug for Sampler<'_, N, L> {
     }
 }
 
-/// A node with its outputs; a [`Node`] by dereference.
+/// A node with the values of the model's outputs; dereferences to [`Node`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeldNode<const N: usize, L: Length<N> = FixedLength> {
     node: Node<N, L>,
@@ -56,12 +58,12 @@ pub struct HeldNode<const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> HeldNode<N, L> {
-    /// All outputs, in the order of the declaration and of sites, with the inputs as they were over the last step.
+    /// All outputs, in the order of declaration and of sites, computed with the inputs of the last step.
     pub fn outputs(&self) -> &[f64] {
         &self.outputs
     }
 
-    /// The output of a name, `stretch` or `stretch[3]`.
+    /// The value of one output, by its name: `stretch`, or `stretch[3]` for a site.
     pub fn output(&self, name: &str) -> Option<f64> {
         let place = self.names.iter().position(|own| own.is(name))?;
         self.outputs.get(place).copied()
@@ -111,7 +113,8 @@ where
         Ok(held)
     }
 
-    /// Sets an input from the node reached on. A name that the model does not declare, or a number that is not finite, changes nothing and stops the next step.
+    /// Sets an input, from the current node on. If the model does not declare the name, or the value is not finite,
+    /// nothing changes and the next [`advance`](Self::advance) returns an error.
     pub fn set(&mut self, input: &str, value: f64) {
         match place(M::INPUTS, input) {
             Ok(place) if value.is_finite() => {
@@ -126,10 +129,12 @@ where
         }
     }
 
-    /// Samples a feedback with its own rate: from the node reached on, every `period`, `law` is asked with the node there, and what it gives is held until the next time. Several inputs, and
-    /// several of one input, may have rates of their own; one that is [set](Self::set) by hand between two samples keeps that until the second.
+    /// Samples a feedback law at its own rate: from the current node on, `law` is called every `period` (in units of
+    /// time) with the node at that time, and its value is held as the input until the next sample.
     ///
-    /// Steps have to end at the samples: the period is a multiple of the step.
+    /// Several inputs may be sampled at different rates, and one input by several laws. An input that is
+    /// [set](Self::set) by hand between two samples keeps that value until the next sample. Steps must end at the
+    /// samples: choose the period as a multiple of the step size.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -151,7 +156,8 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`RunErrorKind::Input`] for a name that the model does not declare, and a period that is not positive. A sample that no step ends at is an error of the step that passes it.
+    /// [`RunErrorKind::Input`] if the model does not declare the input or the period is not positive. If no step ends
+    /// at the time of a sample, the step that passes it returns the error.
     pub fn sample(
         &mut self,
         input: &str,
@@ -212,16 +218,17 @@ where
         Ok(())
     }
 
-    /// The node reached: t, q, v, p and outputs.
+    /// The current node: t, q, v, p and the outputs.
     pub fn node(&self) -> &HeldNode<N, L> {
         &self.node
     }
 
-    /// Goes on by one step.
+    /// Makes one step.
     ///
     /// # Errors
-    /// [`RunErrorKind::Input`] once for what could not be [set](Self::set), and the run may go on; [`RunErrorKind::Solve`] where an element cannot be solved, and
-    /// [`RunErrorKind::Ended`] after that. The node stays that before the step.
+    /// [`RunErrorKind::Input`] once, if an input could not be [set](Self::set); the run may continue.
+    /// [`RunErrorKind::Solve`] if an element cannot be solved, and [`RunErrorKind::Ended`] from every call after that.
+    /// After an error the current node is that before the step.
     pub fn advance(&mut self) -> Result<(), RunErrorKind> {
         if let Some(error) = self.refusal.take() {
             return Err(RunErrorKind::Input(error));
@@ -235,7 +242,7 @@ where
         Ok(())
     }
 
-    /// What the steps so far have cost.
+    /// Counts of iterations, evaluations and factorisations of the steps so far.
     pub fn statistics(&self) -> Statistics {
         self.steps.statistics()
     }

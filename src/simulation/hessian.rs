@@ -11,10 +11,14 @@ use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
-    /// A loss of a run with its [gradient](Self::gradient) and its second derivatives by some parameters.
+    /// Runs over the span and returns a loss with its [gradient](Self::gradient) and its matrix of second derivatives
+    /// ∂²ℓ/∂θᵢ∂θⱼ with respect to the parameters θ named.
     ///
-    /// They are differences of eighth order of gradients that are exact for the run: to some 1e-11 of what the gradient itself changes by. Each parameter takes eight gradients, sixteen or twenty-four where the loss
-    /// bends so much that the places move nearer, and as many again where it does not see the size of the parameter, which is next to zero. [`LossHessian::errors`] says what is known of them. (For least squares [`Fit`](crate::Fit) needs first derivatives only.)
+    /// The second derivatives are differences of eighth order of gradients that are exact for the run; their error is
+    /// about 1e-11 of the change of the gradient. [`LossHessian::errors`] estimates it. Each parameter costs eight
+    /// gradients; sixteen or twenty-four if the loss is so curved that the differences have to be taken over shorter
+    /// distances; and as many again if the loss does not depend on the magnitude of the parameter, because that is
+    /// close to zero. (A least-squares [`Fit`](crate::Fit) needs first derivatives only.)
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -35,9 +39,9 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
     /// # Ok(())
     /// # }
     /// ```
-    ///
     /// # Errors
-    /// As [`gradient`](Self::gradient); [`RunErrorKind::NoParameter`] for a name that the model does not have, [`RunErrorKind::ParametersFixed`] where it cannot be made with other parameters.
+    /// As [`gradient`](Self::gradient). [`RunErrorKind::NoParameter`] if the model has no parameter of a given name,
+    /// [`RunErrorKind::ParametersFixed`] if the model cannot be copied with other parameters.
     pub fn hessian<S: Into<String>>(
         &self,
         start: State<N>,
@@ -55,10 +59,12 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
 }
 
 impl<'m, M: family::Model + Send + Sync + 'm> Simulation<'m, M, 0, RunTimeLength> {
-    /// A loss of a run with its [gradient](Self::gradient) and its second derivatives by some parameters, as of models of fixed size.
+    /// Runs over the span and returns a loss with its [gradient](Self::gradient) and its matrix of second derivatives
+    /// with respect to the parameters named, as for models of fixed size.
     ///
     /// # Errors
-    /// As [`gradient`](Self::gradient); [`RunErrorKind::NoParameter`] for a name that the model does not have, [`RunErrorKind::ParametersFixed`] where it cannot be made with other parameters.
+    /// As [`gradient`](Self::gradient). [`RunErrorKind::NoParameter`] if the model has no parameter of a given name,
+    /// [`RunErrorKind::ParametersFixed`] if the model cannot be copied with other parameters.
     pub fn hessian<S: Into<String>>(
         &self,
         start: FamilyState,

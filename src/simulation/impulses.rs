@@ -5,9 +5,13 @@ use crate::length::RunTimeLength;
 use tfe_runtime::family;
 
 impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
-    /// Adds an impulse: a generalized force of the given time integral, one number for each coordinate, that acts at one instant. An element ends there, and the node shows the momentum
-    /// before it. One at the start of the span acts at once, one at its end on what [`resume`](Self::resume) goes on with. A run that goes back in time takes it away. What is against the constraints
-    /// of a model these take up at once, as of [`Act::Impulse`](crate::Act::Impulse).
+    /// Adds an impulse: a generalized force that acts at the instant `time` and has the time integral `impulse`, one
+    /// number for each coordinate, in units of that coordinate's momentum.
+    ///
+    /// An element ends at that time, and the recorded node shows the momentum before the impulse. An impulse at the
+    /// start of the span acts at once; one at its end acts when the run is [resumed](Self::resume). A run backwards in
+    /// time subtracts it. Constraints react at once to the part of an impulse that violates them, as for
+    /// [`Act::Impulse`](crate::Act::Impulse).
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -15,11 +15,16 @@ where
     Driven<'m, M::Declaring, L>: Simulated<N, L> + Send + Sync,
     L: Length<N>,
 {
-    /// Gives an input of the model as a function of the time, as [`Driven::input`]; one that was given before is given anew. Inputs that are not given are zero.
+    /// Gives an input of the model as a function of time, as [`Driven::input`] does; a second call for the same input
+    /// replaces the first. Inputs that are not given are zero.
     ///
-    /// A name that the model does not declare stops the run before it begins. A function that gives a number that is not finite where it is needed, or panics, ends the run with an error,
-    /// [`InputError::Value`] with the time, or [`InputError::Panicked`]. Panics are caught once for all that a step asks (a panic that aborts the program is not), by `run`, `resume`, `steps`, `hold`,
-    /// [`section`](Self::section), `run_linearised`, `run_estimated` and runs with an `accuracy`. Where the function jumps or has a kink, elements should [end](Self::break_at).
+    /// If the model does not declare the name, the run ends before it begins. If the function returns a number that is
+    /// not finite, the run ends with [`InputError::Value`], which holds the time; if it panics, with
+    /// [`InputError::Panicked`]. Panics are caught (unless the program is compiled to abort) by `run`, `resume`,
+    /// `steps`, `hold`, [`section`](Self::section), `run_linearised`, `run_estimated` and runs with an `accuracy`.
+    ///
+    /// Let elements [end](Self::break_at) where the function jumps or has a kink: otherwise they lose their order of
+    /// accuracy there.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -36,7 +41,7 @@ where
     /// # }
     /// ```
     ///
-    /// So have models of run-time length:
+    /// Models of run-time length have inputs, too:
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -67,7 +72,8 @@ where
         self.driven(|driven| driven.input(name, function))
     }
 
-    /// Gives an input of the model by its values at given times, as [`Driven::table`]; elements end there.
+    /// Gives an input of the model as a table of values at given times, interpolated as [`Driven::table`] says;
+    /// elements end at these times.
     ///
     /// ```
     /// use tfe::Interpolation;
@@ -97,10 +103,11 @@ where
         self.driven(|driven| driven.table(name, times, values, interpolation))
     }
 
-    /// A loop of control: steps one by one, between which inputs are [set](Held::set); inputs that were given before keep their functions until then.
+    /// Starts a control loop: a run step by step, with inputs that can be [set](Held::set) between steps. Inputs given
+    /// before as functions or tables are used until they are set.
     ///
     /// # Errors
-    /// As of [`steps`](Self::steps).
+    /// As from [`steps`](Self::steps).
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -17,7 +17,7 @@ use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, Impulse};
 use tfe_runtime::{CoordinateName, Element, Facts, Form, Statistics, StepError};
 
-/// How elements are solved.
+/// The settings for the solution of elements.
 #[derive(Clone, Copy, Debug)]
 pub struct Chosen {
     pub(crate) element: Element,
@@ -26,7 +26,8 @@ pub struct Chosen {
     pub(crate) at_kinks: bool,
 }
 
-/// A model that runs can be made of: every [`Model`] and every [`family::Model`], and nothing else. Not to be called outside.
+/// A model that can be simulated: implemented for every [`Model`] and every [`family::Model`], and for nothing else.
+/// Its methods are internal.
 pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// What is known of it.
     const FACTS: Facts;

@@ -19,18 +19,26 @@ use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Model, Share, State, StepError};
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
-    /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion.
+    /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element,
     ///
-    /// A matrix costs a factorisation of the element's tangent and 2N solutions with it: half a step for one coordinate, some twenty steps
-    /// for twenty coordinates that a step iterates without Newton's method. Impulses are constant, so that they enter through the
-    /// motion only. The example is at [`Linearised`].
+    /// ```text
+    /// Φ = ∂(p, q)ₖ₊₁ / ∂(p, q)ₖ ,     2N × 2N, ordered (p, q).
+    /// ```
     ///
-    /// At [events](Self::on) that change the state the matrix of their element goes across, with the time of the event, which moves (T-140); acts are called several times with states
-    /// nearby, whose differences of sixth order are their derivatives. Where an event falls on a node, both elements have one matrix.
+    /// Use it for the linear stability of a motion and for the propagation of small changes of the start. There is an
+    /// example at [`Linearised`]. A matrix costs a factorisation of the element's tangent and 2N solutions with it:
+    /// the time of half a step for one coordinate, and of some twenty steps for twenty coordinates if the step itself
+    /// does not use Newton's method. Impulses are constant and do not contribute to the derivative.
+    ///
+    /// At an [event](Self::on) that changes the state, the matrix of the element includes the change of the state and
+    /// that of the time of the event (T-140). The functions given to `on` are called several times with nearby states,
+    /// for differences of sixth order. If an event falls on a node, the elements before and after it share one matrix.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element has no transition matrix, [`RunErrorKind::KinksUnsupported`] where steps were to be cut at
-    /// [kinks](Self::at_kinks), whose times move, [`RunErrorKind::SetByState`] where an event [sets](crate::Act::Set) a parameter to a value that depends on the state.
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Transition`] if an element has no transition matrix,
+    /// [`RunErrorKind::KinksUnsupported`] after [`at_kinks(true)`](Self::at_kinks), because the times of the cuts
+    /// depend on the state, [`RunErrorKind::SetByState`] if an event [sets](crate::Act::Set) a parameter to a value
+    /// that depends on the state.
     pub fn run_linearised(
         &self,
         start: State<N>,

@@ -20,12 +20,14 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Runs over the span, backwards where it ends before it starts. The last node is exactly at the end of the span.
+    /// Integrates the model from `start` over the span; backwards in time if the span ends before it starts. The last
+    /// node is exactly at the end of the span.
     ///
-    /// What is doubtful about the result without being an error is in [`Motion::warnings`].
+    /// Look at [`Motion::warnings`] after the run: it lists signs that the result may be wrong although no step
+    /// failed.
     ///
     /// # Errors
-    /// [`RunError`] says where and why the run stopped and holds the motion so far.
+    /// [`RunError`] says where and why the run stopped, and holds the motion up to there.
     ///
     /// ```
     /// # use tfe::prelude::*;
@@ -245,11 +247,14 @@ where
         M::mesh(span, &self.grid())
     }
 
-    /// The states that follow `start`, one a [`step`](Self::step), which has to be given, without end and in constant memory; elements end at [breaks](Self::break_at), as in [`run`](Self::run).
-    /// After an error the iterator is finished. [`Steps::warnings`] tells what is doubtful about the steps so far.
+    /// An iterator over the nodes that follow `start`, one for each [step](Self::step), without end and in constant
+    /// memory. A step size must be set; elements also end at [breaks](Self::break_at), as in [`run`](Self::run).
     ///
-    /// A step in which an [event](Self::on) changes the state or a parameter has two more nodes, with the states before and after; after the node at which an event stops the run the
-    /// iterator is finished. [`Steps::events`] tells those of the last step.
+    /// After an error the iterator ends. [`Steps::warnings`] lists signs that the steps so far may be wrong.
+    ///
+    /// A step in which an [event](Self::on) changes the state or a parameter has two more nodes, with the states
+    /// before and after the event; after the node at which an event stops the run the iterator ends. [`Steps::events`]
+    /// lists the events of the last step.
     ///
     /// ```
     /// # use tfe::prelude::*;

@@ -27,11 +27,14 @@ where
     M: Sectioned<N, L>,
     L: Length<N>,
 {
-    /// The points at which a motion crosses the surface on which an event or output of the model vanishes: an endless iterator, in constant memory. Other [events](Self::on) are looked for
-    /// as in [`steps`](Self::steps), and do what they do.
+    /// A Poincaré section: an endless iterator, in constant memory, over the points at which the motion crosses the
+    /// surface where an event or output of the model vanishes. Other [events](Self::on) are handled as in
+    /// [`steps`](Self::steps).
     ///
-    /// Points are as accurate as nodes, and none is missed (see [`on`](Self::on)). The motion itself is that of `steps`: it does not know of the section. One that never comes back to the surface
-    /// is followed for ever; an event that [stops](Act::Stop) it, such as `event(late) = t - 1000`, bounds the search.
+    /// The points are as accurate as the nodes, and none is missed (see [`on`](Self::on) for the exceptions). The
+    /// section does not change the motion. If the motion never returns to the surface, the search for the next point
+    /// does not end; declare an event that [stops](Act::Stop) the motion, such as `event(late) = t - 1000`, to bound
+    /// the search.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -84,7 +87,7 @@ where
     }
 }
 
-/// A point of a [section](Simulation::section); an [`Event`] by dereference.
+/// A point of a [Poincaré section](Simulation::section); dereferences to [`Event`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct SectionPoint<const N: usize, L: Length<N> = FixedLength> {
     event: Event<N, L>,
@@ -92,16 +95,18 @@ pub struct SectionPoint<const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> SectionPoint<N, L> {
-    /// The derivative of this point by the one before, or of the first by the start: 2N × 2N, ordered (p, q), for a [linearised](Section::linearised) section.
+    /// The derivative of this point with respect to the one before (of the first point: with respect to the start): 2N
+    /// × 2N, ordered (p, q). `None` unless the section is [linearised](Section::linearised).
     ///
-    /// It takes into account that changed motions cross the section at other times,
+    /// It includes the change of the time at which a neighbouring motion crosses the surface,
     ///
     /// ```text
     /// δy_{k+1} = (1 − ẏ ∇gᵀ/ġ) Φ(t_{k+1}, t_k) δy_k                                           (T-141)
     /// ```
     ///
-    /// so that in models that do not depend on time products of these matrices are derivatives of the return map; its multipliers are their eigenvalues, besides a zero for the normal of the
-    /// section.
+    /// Here Φ is the transition matrix of the motion, g the function of the section. In models that do not depend on
+    /// time, products of these matrices are derivatives of the return map (Poincaré map): their eigenvalues are its
+    /// multipliers, and a zero for the normal of the surface.
     pub fn transition(&self) -> Option<&DMatrix<f64>> {
         self.transition.as_ref()
     }
@@ -115,7 +120,8 @@ impl<const N: usize, L: Length<N>> Deref for SectionPoint<N, L> {
     }
 }
 
-/// The points of a section, one after the other; made by [`Simulation::section`]. After an error, or where an event stops the motion, it is finished.
+/// The iterator over the points of a Poincaré section; made by [`Simulation::section`]. It ends after an error, and
+/// where an event stops the motion.
 pub struct Section<'m, M, const N: usize, L = FixedLength>
 where
     M: Sectioned<N, L> + 'm,
@@ -140,7 +146,7 @@ where
     }
 }
 
-/// A model with sections: those of fixed size have matrices from point to point.
+/// A model that has Poincaré sections; points of models of fixed size can have transition matrices.
 pub trait Sectioned<const N: usize, L: Length<N>>: Simulated<N, L> {
     /// What carries them along.
     type Tangents<'m>: Carry<'m, Self, N, L>
@@ -162,7 +168,7 @@ impl<M: family::Model> Sectioned<0, RunTimeLength> for M {
         M: 'm;
 }
 
-/// Carries matrices from point to point.
+/// Propagates transition matrices from point to point.
 pub trait Carry<'m, M: 'm, const N: usize, L: Length<N>>: Follow<'m, M, N, L> {
     /// The matrix up to a point.
     fn crossed(&mut self, severed: &Severed<'_, 'm, N, L>)
@@ -195,9 +201,12 @@ impl<'m, M: family::Model + 'm> Carry<'m, M, 0, RunTimeLength> for Infallible {
 }
 
 impl<M: Model<N>, const N: usize> Section<'_, M, N> {
-    /// Points with their [transition matrices](SectionPoint::transition) from now on: a factorisation and 2N solutions a step, and as much again at each point. Where steps are to be cut at
-    /// [kinks](Simulation::at_kinks), whose times move, the next point is [`RunErrorKind::KinksUnsupported`]; [`RunErrorKind::SetByState`] ends the points where an event sets a parameter to a value
-    /// that depends on the state.
+    /// Computes the [transition matrix](SectionPoint::transition) of each point from now on, for the cost of a
+    /// factorisation and 2N solutions in each step, and as much again at each point.
+    ///
+    /// If steps are to be cut at [kinks](Simulation::at_kinks), the next point is the error
+    /// [`RunErrorKind::KinksUnsupported`], because the times of the cuts depend on the state. If an event sets a
+    /// parameter to a value that depends on the state, the iterator ends with [`RunErrorKind::SetByState`].
     #[must_use]
     pub fn linearised(mut self) -> Self {
         let Chosen {

@@ -24,17 +24,21 @@ use tfe_runtime::{
 };
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
-    /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
+    /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node with respect to
+    /// all parameters of the model and to the start (forward sensitivities, T-123, T-124). There is an example at
+    /// [`Sensitive`].
     ///
-    /// Those of `sensitivity(…)` have kernels of their own, others are differentiated by dual numbers in the same kernels; both are exact. A step costs a factorisation of its
-    /// tangent besides, a solution for each number of the start and each parameter, and as many products of matrices. Acts of
-    /// [events](Self::on) are called several times with states nearby, whose differences of sixth order are their derivatives.
-    ///
-    /// The example is at [`Sensitive`].
+    /// The derivatives are those of the computed motion, exact up to rounding: parameters declared with
+    /// `sensitivity(…)` have kernels of their own, others are differentiated by dual numbers in the model's kernels.
+    /// Each step costs, besides, one factorisation of its tangent, one solution for each number of the start and each
+    /// parameter, and as many products of matrices. The functions given to [`on`](Self::on) are called several times
+    /// with nearby states, for differences of sixth order. For the gradient of one number with respect to many
+    /// parameters, [`gradient`](Self::gradient) is cheaper.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`] too where an element or an event has no derivative, [`RunErrorKind::KinksUnsupported`] where steps were to be
-    /// cut at [kinks](Self::at_kinks), whose times move.
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Transition`] if an element or an event has no
+    /// derivative, [`RunErrorKind::KinksUnsupported`] after [`at_kinks(true)`](Self::at_kinks), because the times of
+    /// the cuts depend on the state and the parameters.
     pub fn run_sensitive(
         &self,
         start: State<N>,

@@ -13,7 +13,14 @@ use tfe_runtime::Share;
 use tfe_runtime::step::{Control, Impulse};
 use tfe_runtime::{Element, Mixed, Model, Solve};
 
-/// A run to be: which model, with which element and step.
+/// A simulation to be run: a model, the finite element in time, the step size, and further settings such as events,
+/// breaks and tolerances.
+///
+/// Nothing is computed until one of the calls that run it: [`run`](Self::run) over a span, [`steps`](Self::steps)
+/// without end, [`accuracy`](Self::accuracy) with a bound on the error, and others. The same simulation can be run
+/// many times.
+///
+/// All quantities are in consistent units: the time in the unit in which the model's parameters are given.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -32,11 +39,13 @@ use tfe_runtime::{Element, Mixed, Model, Solve};
 /// # }
 /// ```
 ///
-/// Defaults: `Mixed::<4>` (order 6), a thousandth of the span as step, every node recorded, iteration to round-off.
+/// Defaults: element `Mixed::<4>` (order 6), step size one thousandth of the span, every node recorded, each element's
+/// equations iterated until the increments are rounding errors.
 ///
 /// # Models of run-time length
-/// A model with `coordinates(q[n])` costs the same to compile at any length. A step takes time and memory linear in the number of coordinates and terms: one fixed-point iteration for the
-/// forces at all points of the element, four points to a register.
+/// A model declared with `coordinates(q[n])` takes the same time to compile for any length n. A step takes time and
+/// memory linear in the number of coordinates and terms: the forces at all points of the element are iterated to a
+/// fixed point, four points to a vector register.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -62,9 +71,10 @@ use tfe_runtime::{Element, Mixed, Model, Solve};
 /// # }
 /// ```
 ///
-/// Without the feature `sparse` their kinetic energy must be ½ Σ m v² with constant masses, one for each coordinate; the potential energy and the forces may be any. With it a
-/// Lagrangian may have any kinetic energy and holonomic constraints: `constraint(rod[i in 0..n-1]) = …`. What they cannot do is a typed error, [`RunErrorKind::Unsupported`]; the table of calls
-/// is in `docs/calls.md`.
+/// Without the feature `sparse`, the kinetic energy of such a model must be ½ Σ m v² with constant masses, one for
+/// each coordinate; the potential energy and the forces may be arbitrary. With `sparse`, a Lagrangian may have any
+/// kinetic energy and holonomic constraints, `constraint(rod[i in 0..n-1]) = …`. A call that such models do not
+/// support returns [`RunErrorKind::Unsupported`]; `docs/calls.md` has the table of calls.
 #[derive(Debug)]
 pub struct Simulation<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(super) model: Share<'m, M>,
@@ -100,7 +110,7 @@ impl<M, const N: usize, L: Length<N>> Clone for Simulation<'_, M, N, L> {
 }
 
 impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
-    /// A run of `model` with the defaults.
+    /// A simulation of `model` with the defaults listed at [`Simulation`].
     pub fn new(model: &'m M) -> Self
     where
         M: Declared<N, Length = L>,
@@ -121,23 +131,31 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         }
     }
 
-    /// The element: `Mixed::<4>`, which is the default, `Primal::<3>.reduced()`, `Element::mixed(n)`, …; for models of run-time length without the feature `sparse` those that are Runge–Kutta methods, with
-    /// constraints those of them with Gauss points.
+    /// Sets the element: `Mixed::<4>` (the default), `Primal::<3>.reduced()`, `Element::mixed(n)`, …
+    ///
+    /// Models of run-time length accept only elements that are Runge–Kutta (collocation) methods, unless the feature
+    /// `sparse` is on; if they have constraints, only those with Gauss points.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = Some(element.into());
         self
     }
 
-    /// The step h, in the units of time; by default a thousandth of the span, where there is one. Where the span is no whole number of steps the last one is shorter.
+    /// Sets the step size h, the length of each element in units of time; must be finite and not zero.
+    ///
+    /// By default it is one thousandth of the span; calls without a span (`steps`, `hold`, `section`) have no default.
+    /// Where the span is not a whole number of steps, the last step is shorter.
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
         self
     }
 
-    /// The nodes: every element goes from one of these times to the next, and ends at every [break](Self::break_at) besides. They begin and end with the span of the run;
-    /// instead of a [step](Self::step). [`steps`](Self::steps), which has no end, does not use them.
+    /// Sets the nodes, instead of a [step size](Self::step): each element goes from one of these times to the next.
+    ///
+    /// The first and the last time must be the ends of the span of the run, and the times must be strictly monotonic;
+    /// elements also end at every [break](Self::break_at). [`steps`](Self::steps), which has no end, does not use
+    /// nodes.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -163,55 +181,73 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         self
     }
 
-    /// What the iteration inside an element may leave, relative to the state. It is judged by the rest of the geometric series of its increments, a fixed point by a 64th of that. Elements of a
-    /// run leave errors of the same sign, so that they add up; below some 1e-15 all values do the same, since roundings end the iteration. The default iterates to round-off; above 1e-14
-    /// the sums of a step are no longer carried with what rounding takes from them (`docs/theory.md` §10.4). Models with constraints take 1e-9 for anything larger.
+    /// Sets the tolerance of the iteration inside an element: the error that it may leave, relative to the state.
+    ///
+    /// The error is estimated as the remainder of the geometric series of the increments (for a fixed-point iteration,
+    /// a 64th of the tolerance is required). The default iterates until only rounding errors are left. Iteration
+    /// errors of successive elements tend to have the same sign and add up over a run. Values below about 1e-15 all
+    /// have the same effect, because rounding ends the iteration first; with a value above 1e-14 the sums of a step
+    /// are no longer compensated for rounding (`docs/theory.md` §10.4). Models with constraints replace values above
+    /// 1e-9 by 1e-9.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
         self
     }
 
-    /// The most iterations an element may take before the run stops with an error, 100 by default.
+    /// Sets the largest number of iterations in one element, 100 by default; if an element needs more, the run stops
+    /// with an error.
     #[must_use]
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.control.max_iterations = iterations;
         self
     }
 
-    /// How the element's equations are solved; `Solve::Auto` by default, which cuts steps whose solution is not proven to continue the motion ([`Solve::Trusting`] does
-    /// not; `docs/theory.md` §10.6).
+    /// Sets how the equations of an element are solved; `Solve::Auto` by default.
     ///
-    /// Models of run-time length begin with the fixed point; with the feature `sparse`, steps that contract badly go to Newton's method with a sparse factorisation, without it they
-    /// are errors, and so is `Solve::Newton`.
+    /// `Auto` cuts a step into shorter ones if its solution is not shown to be the one that continues the motion;
+    /// [`Solve::Trusting`] accepts it without that check (`docs/theory.md` §10.6).
+    ///
+    /// Models of run-time length begin with a fixed-point iteration. With the feature `sparse`, steps whose iteration
+    /// contracts slowly are solved by Newton's method with a sparse factorisation; without it such steps are errors,
+    /// and so is `Solve::Newton`.
     #[must_use]
     pub fn solver(mut self, solve: Solve) -> Self {
         self.control.solve = solve;
         self
     }
 
-    /// Records every `k`-th node (and always the first and the last). With `k` > 1 the elements' polynomials are not kept, so a long run takes
-    /// little memory but [`Motion::at`](crate::Motion::at) knows the recorded nodes only. 0 counts as 1.
+    /// Records only every `k`-th node, and always the first and the last; 0 counts as 1.
+    ///
+    /// With `k` > 1 the polynomials of the elements are not kept. A long run then takes little memory, but
+    /// [`Motion::at`](crate::Motion::at) can evaluate the motion at the recorded nodes only.
     #[must_use]
     pub fn record_every(mut self, k: usize) -> Self {
         self.record_every = k.max(1);
         self
     }
 
-    /// Makes an element end at `time`: where a force jumps, an element across the jump would lose its order.
+    /// Makes an element end at `time`. Use it where a force jumps at a known time: an element across the jump would
+    /// lose its order of accuracy.
     #[must_use]
     pub fn break_at(mut self, time: f64) -> Self {
         self.breaks.push(time);
         self
     }
 
-    /// Whether steps are cut where a force has a kink or a jump: where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments
-    /// of a `min` or `max` changes its sign, in the state or in time (`docs/theory.md` §10.7). Elements keep their order then, and the run stays on the grid asked for;
-    /// [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. A motion that would slide along a jump is an error, [`StepError::Slides`](crate::runtime::StepError::Slides).
+    /// Sets whether steps end where a force has a kink or a jump, so that elements keep their order of accuracy.
     ///
-    /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) do so only if asked, runs with an [`accuracy`](Self::accuracy) unless forbidden;
-    /// `run_linearised`, `run_sensitive`, `gradient`, `hessian` and linearised [sections](Self::section) refuse to, as [`RunErrorKind::KinksUnsupported`]: derivatives do not know that the times of
-    /// the cuts move. Those of models of run-time length have none across a kink, [`RunErrorKind::Unsupported`].
+    /// Kinks are found where the argument of `abs` or `sign`, the condition of `select`, or the difference of the
+    /// arguments of `min` or `max` changes its sign, as a function of the state or of time (`docs/theory.md` §10.7).
+    /// The run returns to its grid of steps after each kink; [`Statistics::kinks`](crate::Statistics::kinks) counts
+    /// the crossings. A motion that would slide along a jump is an error,
+    /// [`StepError::Slides`](crate::runtime::StepError::Slides).
+    ///
+    /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) cut steps at kinks only
+    /// after `at_kinks(true)`; runs with an [`accuracy`](Self::accuracy) do so unless `at_kinks(false)` was called.
+    /// `run_linearised`, `run_sensitive`, `gradient`, `hessian` and linearised [sections](Self::section) fail with
+    /// [`RunErrorKind::KinksUnsupported`], because their derivatives do not include the change of the time at which a
+    /// step is cut; for models of run-time length, derivatives across a kink fail with [`RunErrorKind::Unsupported`].
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -298,9 +334,12 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
 }
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
-    /// Adds an impulse: a generalized force of the given time integral that acts at one instant. Inside an element it is weighted by the test
-    /// functions, at a node it changes the momentum there (`docs/theory.md`, impulses). The node at that instant shows the momentum before it. A run that goes back in time takes it
-    /// away, as it does what any force gives.
+    /// Adds an impulse: a generalized force that acts at the instant `time` and has the time integral `impulse`, one
+    /// number for each coordinate, in units of that coordinate's momentum.
+    ///
+    /// Inside an element the impulse is weighted by the test functions; at a node it changes the momentum there, and
+    /// the recorded node at that instant shows the momentum before the impulse (`docs/theory.md`, impulses). In a run
+    /// backwards in time the impulse is subtracted, as the effect of any force is.
     #[must_use]
     pub fn impulse(mut self, time: f64, impulse: [f64; N]) -> Self {
         self.impulses.push(Impulse {

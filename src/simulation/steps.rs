@@ -16,7 +16,7 @@ use std::fmt;
 use tfe_runtime::Share;
 use tfe_runtime::Statistics;
 
-/// The endless sequence of states of [`Simulation::steps`](crate::Simulation::steps).
+/// An endless iterator over the nodes of a motion, made by [`Simulation::steps`](crate::Simulation::steps).
 pub struct Steps<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     way: Way<'m, M, N, L>,
     /// Of the last node, from where the next is looked for.
@@ -172,8 +172,8 @@ where
         }
     }
 
-    /// What is doubtful about the steps so far without being an error, as [`Motion::warnings`](crate::Motion::warnings) tells it of a run. Where events are looked for, neither jumps of
-    /// the energy nor unstable steps are.
+    /// Signs that the steps so far may be wrong although none failed, as [`Motion::warnings`](crate::Motion::warnings)
+    /// gives for a run. If events are looked for, jumps of the energy and unstable step sizes are not checked.
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = self.watch.warnings().to_vec();
         warnings.extend(self.resolution.warning(&self.way.state));
@@ -218,13 +218,13 @@ where
         Some(Node::of(t, &self.way.state, self.velocity.clone()))
     }
 
-    /// What the steps so far have cost.
+    /// Counts of iterations, evaluations and factorisations of the steps so far.
     pub fn statistics(&self) -> Statistics {
         self.way.statistics()
     }
 
-    /// The [events](crate::Simulation::on) met in the step that led to the node given last, in their order. Where a step has several nodes, because events changed the state, they come
-    /// with the first of them.
+    /// The [events](crate::Simulation::on) in the step that led to the node returned last, in order of time. If a step
+    /// has several nodes because events changed the state, the events are given with the first of these nodes.
     pub fn events(&self) -> &[Event<N, L>] {
         (self.way.pieces.as_ref()).map_or(&[], |pieces| &pieces.events.met)
     }

@@ -24,18 +24,28 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Picks element and step so that the estimated error is at or below `accuracy` wherever it is estimated: of coordinates over the largest coordinate, of
-    /// momenta over the largest momentum, of each declared output over its largest value.
+    /// Chooses the element and the step size such that the estimated error is at most `accuracy`, and runs with them.
     ///
-    /// Less than a rounding, ε/2 = 1.1e-16, is never met: [`RunErrorKind::AccuracyMissed`] then, with the best motion.
+    /// The error is relative, and estimated at the times at which the runs are compared: the error of the coordinates
+    /// divided by the largest coordinate, of the momenta divided by the largest momentum, and of each declared output
+    /// divided by its largest value. The motion carries its estimate, and [`Estimated::picked`] says what was chosen and
+    /// why.
     ///
-    /// An element chosen before stays, a step given before is the longest one allowed. The motion comes with its error and says what was picked and why. Two to
-    /// four runs over the span are made with shorter and shorter steps, and one more that verifies the last: with an element of one node more over the same steps, which tells the
-    /// error as [`run_estimated`](Self::run_estimated) does (`docs/theory.md` §14.3). What is verified is the error of the steps and of their iterations at the times of comparison; that both
-    /// elements see all there is, such as a force that acts for a time much shorter than a step, is believed.
+    /// An element set before is kept, and a step size set before is the largest one allowed. Two to four runs over the
+    /// span are made with shorter and shorter steps, and one more for verification: over the same steps with an
+    /// element of one node more, whose difference is the estimate, as in [`run_estimated`](Self::run_estimated)
+    /// (`docs/theory.md` §14.3). This verifies the discretisation error and the error of the iteration at the times of
+    /// comparison. It cannot detect what both elements miss, such as a force that acts for a time much shorter than a
+    /// step.
     ///
-    /// Steps are equal, between breaks, for models that are conservative and do not depend on time, unless their Hamiltonian is linear in the momenta (equations of first order, p·f(q)). For others they are short where the motion is fast, if equal ones
-    /// would be many and steps differ by more than three (`docs/theory.md` §14.5); [`Accurate::equal_steps`] forbids that. [Nodes](Simulation::nodes) given before are refined as a whole.
+    /// Steps are equal (between breaks) for conservative models that do not depend on time, except for Hamiltonians
+    /// linear in the momenta, p·f(q), which are equations of first order. Other models get shorter steps where the
+    /// motion is fast, if many equal steps would be needed and the step sizes would differ by more than a factor of
+    /// three (`docs/theory.md` §14.5); [`Accurate::equal_steps`] forbids this. [Nodes](Simulation::nodes) set before
+    /// are refined all together.
+    ///
+    /// An `accuracy` below the rounding unit ε/2 = 1.1e-16 is never met: the run then returns
+    /// [`RunErrorKind::AccuracyMissed`] with the best motion.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -60,14 +70,17 @@ where
         Accurate::new(self, accuracy)
     }
 
-    /// Runs over the span as [`run`](Self::run) does, and estimates the error at every node by a second run with an element of higher order:
+    /// Runs over the span as [`run`](Self::run) does, and estimates the error at every node by a second run with an
+    /// element of higher order:
     ///
     /// ```text
     /// E(t) = |y_{h, n}(t) − y_{h, n+1}(t)|                                                    (T-98)
     /// ```
     ///
-    /// with the same steps and one node more; beside an element of twelve nodes, two steps for each of one of twelve. It costs a little more than another run. Where
-    /// steps are far too long for the motion both runs are wrong and so is the estimate: it is large then, never small by chance at all nodes.
+    /// where the second run uses the same steps and an element with one node more; an element of twelve nodes is
+    /// compared with two half steps of the same element. The cost is a little more than that of two runs. If the steps
+    /// are far too long for the motion, both runs are wrong and so is the estimate, but it is then large: it is not
+    /// small by chance at all nodes.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -89,7 +102,7 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run), of either run.
+    /// [`RunError`], as from [`run`](Self::run), of either of the two runs.
     pub fn run_estimated(
         &self,
         start: L::State,
@@ -123,11 +136,12 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Runs over the span with the element and the step that meet the accuracy.
+    /// Runs over the span with an element and a step size that meet the accuracy.
     ///
     /// # Errors
-    /// [`RunError`], as from [`Simulation::run`]; [`RunErrorKind::AccuracyMissed`] where no step was found that meets the accuracy, with the best motion in
-    /// [`partial`](RunError::partial): a chaotic motion over a span too long, or less than roundings make.
+    /// [`RunError`], as from [`Simulation::run`]. [`RunErrorKind::AccuracyMissed`] if no step size was found that
+    /// meets the accuracy, for example because the motion is chaotic and the span too long, or the accuracy is below
+    /// the effect of rounding; the best motion is in [`partial`](RunError::partial).
     pub fn run(
         &self,
         start: L::State,

@@ -14,14 +14,15 @@ use std::ops::Deref;
 use std::sync::Arc;
 use tfe_runtime::{Model, State};
 
-/// Which changes of sign count. They are those that the run sees: what rises in a run falls in one that goes back over it.
+/// Which changes of sign count as an event. The direction is as the run sees it: what rises in a run forwards in time
+/// falls in a run backwards.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crossing {
-    /// From below zero to above.
+    /// From negative to positive.
     Rising,
-    /// From above zero to below.
+    /// From positive to negative.
     Falling,
-    /// Both.
+    /// Both directions.
     Either,
 }
 
@@ -35,23 +36,30 @@ impl Crossing {
     }
 }
 
-/// What is done at an event.
+/// What a run does at an event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Act<const N: usize, L: Length<N> = FixedLength> {
-    /// The event is recorded, as all are, and the run goes on as if nothing had happened, with the same bits.
+    /// Record the event, as every event is, and continue as if nothing had happened, with the same bits.
     Record,
-    /// The run ends at the event.
+    /// End the run at the event.
     Stop,
-    /// The element ends at the event, and the run goes on from this state.
+    /// End the element at the event, and continue from this state.
     Restart(L::State),
-    /// The same with momenta that are larger by an impulse. What of it is against constraints, these take up at once: the run goes on with the velocity that is left,
-    /// L_v(q, v) + Aᵀν = p + J, A v + a = 0 (T-74).
+    /// End the element at the event, and add an impulse J (one number for each coordinate) to the momenta. Constraints
+    /// react at once to the part of the impulse that violates them: the run continues with the velocity v and the
+    /// momentum L_v(q, v) of
+    ///
+    /// ```text
+    /// L_v(q, v) + Aᵀν = p + J ,     A v + a = 0                        (T-74)
+    /// ```
     Impulse(L::Vector),
-    /// The same with other values of parameters, and from another state if one is given with them: [`Settings`].
+    /// End the element at the event, and continue with new values of parameters, and from another state if the
+    /// [`Settings`] contain one.
     Set(Settings<N, L>),
 }
 
-/// An event while it happens: an [`Event`] that knows its model.
+/// An event at the moment when it happens, passed to the function given to [`Simulation::on`](crate::Simulation::on):
+/// an [`Event`] (by dereference) that knows its model.
 pub struct Occurrence<'a, const N: usize, L: Length<N> = FixedLength> {
     event: &'a Event<N, L>,
     model: &'a dyn Knows<N, L>,
@@ -65,22 +73,27 @@ trait Knows<const N: usize, L: Length<N>> {
 }
 
 impl<const N: usize, L: Length<N>> Occurrence<'_, N, L> {
-    /// The state at the same coordinates with other velocities; its momenta are NaN where none belong to them, and the run then ends with an error.
+    /// The state with the same coordinates and other velocities. Its momenta are NaN if no momentum belongs to these
+    /// velocities; the run then ends with an error.
     pub fn state_with_velocity(&self, v: L::Vector) -> L::State {
         L::state(self.event.q.clone(), self.model.momenta(&v))
     }
 
-    /// The state after an impact without friction on the surface g(t, q) = 0 of the event, with a coefficient of restitution e,
+    /// The state after a frictionless impact on the surface g(t, q) = 0, where g is the function of this event, with
+    /// coefficient of restitution e (1 for an elastic impact, 0 for a perfectly plastic one):
     ///
     /// ```text
     /// L_v(q, v⁺) = L_v(q, v⁻) + g_qᵀ λ + Aᵀ μ ,     ġ⁺ = −e ġ⁻ ,     A v⁺ + a = 0 .                        (T-139)
     /// ```
     ///
-    /// The impulse acts along the normal of the surface and those of the constraints of the model, which hold after it as before. With e = 1 the energy is kept where neither surface nor
-    /// constraints move. NaN, with which the run ends, where g depends on velocities, or where the constraints leave no motion along its normal.
+    /// with constraint Jacobian A. The impulse acts along the normal of the surface and along the normals of the
+    /// model's constraints, which hold after the impact as before. With e = 1 the energy is conserved if neither the
+    /// surface nor the constraints move. The state is NaN, and the run ends with an error, if g depends on velocities
+    /// or if the constraints allow no motion along the normal of the surface.
     ///
-    /// Nothing holds a motion on the surface. Where e is zero, or so small that the way back is not seen, and forces press the motion on the surface, it has come to rest there, and the run ends with
-    /// [`RunErrorKind::EventsWithoutEnd`].
+    /// Nothing holds the motion on the surface afterwards. If e is zero, or so small that the rebound cannot be
+    /// resolved, and the forces press the motion onto the surface, the motion has come to rest there, and the run ends
+    /// with [`RunErrorKind::EventsWithoutEnd`].
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -109,7 +122,8 @@ impl<const N: usize, L: Length<N>> Occurrence<'_, N, L> {
         self.model.after_impact(restitution)
     }
 
-    /// The value that a parameter of the model has when the event happens, after all that earlier events have [set](Act::Set); `None` for a name that is none.
+    /// The current value of a parameter of the model, including changes that earlier events have [set](Act::Set);
+    /// `None` if the model has no parameter of this name.
     pub fn parameter(&self, name: &str) -> Option<f64> {
         self.model.parameter(name)
     }

@@ -12,18 +12,27 @@ where
     M: Settable<'m, N, L>,
     L: Length<N>,
 {
-    /// Does `act` whenever the event or output `name` of the model changes its sign in the direction of `crossing`; [`Motion::events`](crate::Motion::events) lists what was met. Of several
-    /// events the run does what is to be done in the order of time.
+    /// Calls `act` whenever the event or output `name` of the model changes its sign in the direction of `crossing`,
+    /// and does what it returns. [`Motion::events`](crate::Motion::events) lists all events found.
     ///
-    /// Events at the same time, as far as roundings of the time can tell, are all met there, in the order in which they were declared. So are two calls of `on` for the same event. Each act is
-    /// given the state that the acts before it have left; after one that [stops](Act::Stop) the run there are no others. A change of sign that an act itself makes, by another state or other
-    /// parameters, is no event.
+    /// The time of an event is that of the end of an element that ends at the event, so it is as accurate as the
+    /// nodes. If the state or a parameter changes, an element really ends there, and two nodes have that time, with
+    /// the states before and after.
     ///
-    /// Times are those of an element that ends at the event, so that they are as accurate as nodes. An element ends there too where the state or parameters change: two nodes have that
-    /// time then, with the states before and after. None is missed: where an output cannot change its sign on an element's polynomial is proved by interval arithmetic, and what is left is
-    /// searched (`docs/theory.md` §10.8). Pairs closer than 10⁻⁶ of an element may be, and those of functions given to [inputs](Self::input), which are known at samples. A value that
-    /// touches zero without changing its sign is no event. Nor is one that is zero at the start of the run; one that is zero at the end has its event when the run is
-    /// [resumed](Self::resume), if it changes its sign then. Where a value stays at zero for a while between two signs, there is one event, at a time in between.
+    /// Events are handled in order of time. Events whose times cannot be told apart within rounding are all handled
+    /// there, in the order of their declaration; the same holds for several calls of `on` for one event. Each `act`
+    /// sees the state that the previous ones have left; after one that [stops](Act::Stop) the run no other is called.
+    /// A change of sign that an act itself makes, by a new state or new parameters, is not an event.
+    ///
+    /// No event is missed, with two exceptions: interval arithmetic proves where a function cannot change its sign on
+    /// the polynomial of an element, and the rest is searched (`docs/theory.md` §10.8). The exceptions are pairs of
+    /// changes of sign closer than 10⁻⁶ of an element, and pairs that come from functions given to
+    /// [inputs](Self::input), which are known at samples only.
+    ///
+    /// A value that touches zero without changing its sign is not an event, nor is a value that is zero at the start
+    /// of the run. A value that is zero at the end of the run is an event of the [resumed](Self::resume) run, if it
+    /// changes its sign then. If a value stays at zero for a while between two different signs, there is one event, at
+    /// some time in between.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -56,10 +65,11 @@ where
         self
     }
 
-    /// The same for a function g(t, q, q̇) that the model does not declare; `name` is how events are called.
+    /// As [`on`](Self::on), for a function g(t, q, q̇) that the model does not declare; the events are called `name`.
     ///
-    /// It is known at samples only, at least eight in an element and more for those of high degree: a pair of changes between two samples is found where a parabola through three of them
-    /// comes near zero, and may be missed where it does not. An [event](Self::on) that is declared is proved not to be.
+    /// The function is known at samples only: at least eight in each element, more for elements of high degree. A pair
+    /// of changes of sign between two samples is found if a parabola through three samples comes near zero, and may
+    /// otherwise be missed. Declare an [event](Self::on) in the model if none may be missed.
     ///
     /// ```
     /// use tfe::prelude::*;

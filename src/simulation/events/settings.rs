@@ -7,13 +7,14 @@ use crate::motion::Event;
 use crate::simulation::kind::Simulated;
 use tfe_runtime::CoordinateName;
 
-/// New values of parameters, for [`Act::Set`](crate::Act::Set). They hold until they are set again, or the run ends; the model of the caller stays as it is.
+/// New values of parameters, for [`Act::Set`](crate::Act::Set). They hold until they are set again or the run ends;
+/// the caller's model does not change.
 ///
-/// Coordinates and momenta stay as they are at the event, unless a [state](Self::and_state) or a [velocity](Self::and_velocity) is given: the momentum that stays has another velocity where a
-/// mass is set.
+/// The coordinates and momenta stay as they are at the event, unless a [state](Self::and_state) or a
+/// [velocity](Self::and_velocity) is given. If a mass changes, the same momentum means another velocity.
 ///
-/// Values may depend on the state at the event. [Transition matrices](crate::Simulation::run_linearised) do not hold that, and such runs are refused by them
-/// ([`RunErrorKind::SetByState`](crate::RunErrorKind::SetByState)).
+/// The new values may depend on the state at the event. [Transition matrices](crate::Simulation::run_linearised) do
+/// not include that dependence and fail with [`RunErrorKind::SetByState`](crate::RunErrorKind::SetByState).
 ///
 /// ```
 /// use tfe::Settings;
@@ -55,7 +56,7 @@ enum From<const N: usize, L: Length<N>> {
 }
 
 impl<const N: usize, L: Length<N>> Settings<N, L> {
-    /// Sets one parameter: `k`, or `m[2]` for an element of an array.
+    /// Sets one parameter: `k`, or `m[2]` for an element of an array, in the units of the model.
     pub fn new(parameter: impl Into<String>, value: f64) -> Self {
         Self {
             values: vec![(parameter.into(), value)],
@@ -63,21 +64,21 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
         }
     }
 
-    /// Sets another one besides.
+    /// Sets one more parameter.
     #[must_use]
     pub fn and(mut self, parameter: impl Into<String>, value: f64) -> Self {
         self.values.push((parameter.into(), value));
         self
     }
 
-    /// Goes on from this state.
+    /// Continues from this state.
     #[must_use]
     pub fn and_state(mut self, state: L::State) -> Self {
         self.from = From::State(state);
         self
     }
 
-    /// Goes on with these velocities, whose momenta are those of the new parameters.
+    /// Continues with these velocities; the momenta are computed from them with the new parameters.
     #[must_use]
     pub fn and_velocity(mut self, v: L::Vector) -> Self {
         self.from = From::Velocity(v);

@@ -39,17 +39,21 @@ impl From<RunErrorKind> for Failure {
 }
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
-    /// Runs over the span as [`run`](Self::run) does, and gives a loss of the motion with its gradient by all parameters of the model and by the start, in one pass backwards.
+    /// Runs over the span as [`run`](Self::run) does, and returns a loss of the motion with its gradient with respect
+    /// to all parameters of the model and to the start, in one pass backwards (adjoint method, T-150).
     ///
-    /// Every element is solved once more, from where it began; memory beside that of all nodes is linear in the number of coordinates where the equations are M q̈ = f with a constant diagonal M
-    /// (T-150), and so is the time. Functions of nodes of models of run-time length are [`Loss::of_end`].
+    /// Every element is solved once more from its recorded start. Besides the nodes, time and memory are linear in the
+    /// number of coordinates if the equations are M q̈ = f with a constant diagonal mass matrix M. A loss that is a
+    /// function of nodes is given by [`Loss::of_end`].
     ///
-    /// With [`record_every`](Self::record_every) every k-th node is kept, and the motion between two of them is made once more on the way back: about k + n/k of n nodes are in memory, for the time of one more run.
+    /// With [`record_every`](Self::record_every) only every k-th node is kept, and the motion between two of these is
+    /// computed again on the way back: about k + n/k of n nodes are in memory, for the time of one more run.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::NoOutput`](crate::RunErrorKind::NoOutput) and [`RunErrorKind::Loss`](crate::RunErrorKind::Loss) for a loss that does not belong to the model
-    /// and the span. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for events that change the state or end the run, and where
-    /// steps were so long that they were cut.
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::NoOutput`](crate::RunErrorKind::NoOutput) or
+    /// [`RunErrorKind::Loss`](crate::RunErrorKind::Loss) if the loss does not fit the model or the span.
+    /// [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for events that
+    /// change the state or end the run, and if steps were so long that they had to be cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn gradient(
         &self,

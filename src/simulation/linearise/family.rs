@@ -15,13 +15,16 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
-    /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element with the motion: 2n × 2n, ordered (p, q).
+    /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix Φ = ∂(p, q)ₖ₊₁/∂(p, q)ₖ of every
+    /// element: 2n × 2n, ordered (p, q).
     ///
-    /// Elements are solved once more for their matrices, which are dense: 4n² numbers an element, and 2n solutions with sparse factors.
+    /// Every element is solved once more for its matrix, with 2n solutions by sparse factors. The matrices are dense:
+    /// 4n² numbers for each element.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for events that change the state or end the run, and where steps were
-    /// so long that they were cut.
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported)
+    /// without the feature `sparse`, for events that change the state or end the run, and if steps were so long that
+    /// they had to be cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_linearised(
         &self,

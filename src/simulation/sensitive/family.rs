@@ -19,15 +19,18 @@ use {
 };
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
-    /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node by all parameters of the model and by the start.
+    /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node with respect to
+    /// all parameters of the model and to the start.
     ///
-    /// Parameters are fields that are numbers and elements of fields that are vectors of numbers. Every element is solved once more, with sparse factors, and then once for each number
-    /// of the start and each parameter; what is kept of a node are 2n (2n + parameters) numbers and as many for velocities and outputs
-    /// ([`record_every`](Self::record_every) keeps fewer nodes).
+    /// Parameters are the fields that are numbers, and the elements of fields that are vectors of numbers. Every
+    /// element is solved once more with sparse factors, and then once for each number of the start and each parameter.
+    /// Each recorded node keeps 2n (2n + parameters) numbers, and as many for velocities and outputs;
+    /// [`record_every`](Self::record_every) keeps fewer nodes.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for events that change the state or end the run, and where steps were
-    /// so long that they were cut.
+    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported)
+    /// without the feature `sparse`, for events that change the state or end the run, and if steps were so long that
+    /// they had to be cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_sensitive(
         &self,
