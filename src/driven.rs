@@ -18,10 +18,11 @@ pub use error::InputError;
 pub(crate) use sources::Cells;
 pub use table::Interpolation;
 
-/// A model with its inputs: a model itself, of the same coordinates and states.
+/// A model whose inputs are given as functions of time; itself a model, with the same coordinates and states.
 ///
-/// [`Simulation::input`](crate::Simulation::input) makes one for a run. By itself it is for what takes models: orbits, boundary values, ensembles, work-precision diagrams. `L` is the kind of
-/// length of the model.
+/// [`Simulation::input`](crate::Simulation::input) makes one for a run. Make one yourself where a model is expected:
+/// for periodic orbits, boundary-value problems, ensembles, work–precision diagrams. The parameter `L` is the kind of
+/// length of the model (fixed or known at run time).
 ///
 /// ```
 /// use tfe::Driven;
@@ -44,7 +45,8 @@ pub struct Driven<'m, M, L = FixedLength> {
     length: PhantomData<L>,
 }
 
-/// A model that declares inputs: every [`Controlled`] and every [`family::Controlled`], and nothing else.
+/// A model that declares inputs: implemented for every [`Controlled`] and every [`family::Controlled`], and nothing
+/// else.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` declares no input",
     label = "a model without inputs",
@@ -63,7 +65,7 @@ impl<M: family::Controlled> HasInputs<0, RunTimeLength> for M {
     const INPUTS: &'static [&'static str] = M::INPUTS;
 }
 
-/// What can be given inputs: a model that declares some, or one that has been given some already.
+/// What can be given inputs: a model that declares some, or a [`Driven`] model that already has some.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` declares no input",
     label = "a model without inputs",
@@ -153,12 +155,17 @@ impl<'m, M, L> Driven<'m, M, L> {
         }
     }
 
-    /// Gives an input as a function of the time; it is asked at the points of elements, several times each, in any order. What it may do wrong is told by
-    /// [runs](crate::Simulation::input); elsewhere a panic goes on to the caller, and a number that is not finite is an element that cannot be solved. Derivatives of motions whose events or spans
-    /// move need that of the function: differences over 5·10⁻⁴ ∛t and, where it changes faster, less, so that it is asked as far beyond the span.
+    /// Gives an input as a function of time. The function is evaluated at the points of elements, several times each,
+    /// in any order.
+    ///
+    /// Where a run evaluates a function that panics or returns a number that is not finite, [it says
+    /// so](crate::Simulation::input); elsewhere a panic goes on to the caller, and an element with a number that is
+    /// not finite cannot be solved. Derivatives of motions whose events or spans move with the state need the time
+    /// derivative of the function. It is taken by differences over 5·10⁻⁴ ∛t, or less where the function changes
+    /// faster, so that the function is also evaluated that far outside the span.
     ///
     /// # Errors
-    /// [`InputError::Unknown`].
+    /// [`InputError::Unknown`] if the model does not declare the input.
     pub fn input<const N: usize>(
         mut self,
         name: &str,
@@ -172,11 +179,12 @@ impl<'m, M, L> Driven<'m, M, L> {
         Ok(self)
     }
 
-    /// Gives an input by its values at given times; before the first and after the last it keeps theirs. Elements must end at the times to keep their order:
-    /// [`Simulation::table`](crate::Simulation::table) sees to that.
+    /// Gives an input as a table of values at given times; before the first time and after the last it is constant.
+    /// Elements must end at these times to keep their order of accuracy:
+    /// [`Simulation::table`](crate::Simulation::table) does this.
     ///
     /// # Errors
-    /// [`InputError::Unknown`], [`InputError::Table`].
+    /// [`InputError::Unknown`] if the model does not declare the input, [`InputError::Table`] if the table is invalid.
     pub fn table<const N: usize>(
         mut self,
         name: &str,

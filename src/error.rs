@@ -14,41 +14,48 @@ use tfe_runtime::{ElementError, InputFailure, StepError};
 
 pub use crate::motion::AtError;
 
-/// Why a run stopped.
+/// Why a run failed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RunErrorKind {
-    /// The element does not exist (number of nodes, quadrature).
+    /// The element does not exist: an impossible number of nodes, or a quadrature that this family of elements does
+    /// not have.
     Element(ElementError),
-    /// Of a model of run-time length: lengths that do not belong together, or something that such models cannot do yet.
+    /// For models of run-time length: lengths that do not fit each other, or something that such models do not
+    /// support.
     Family(family::ModelError),
-    /// The step is zero, infinite or not a number, as it is where a run without an end is not given one.
+    /// The step size is zero, infinite or not a number. It is not a number (NaN) if a run without an end was given no
+    /// step size.
     Step {
         /// The step asked for.
         step: f64,
     },
-    /// The accuracy asked for is no number between 0 and 1.
+    /// The accuracy asked for is not between 0 and 1.
     Accuracy {
         /// What was asked for.
         asked: f64,
     },
-    /// No step was found with which the estimated error is as small as it was asked to be. The motion is the best one that was found.
+    /// No step size was found with which the estimated error is as small as asked. The motion in
+    /// [`partial`](RunError::partial) is the best one found.
     AccuracyMissed {
         /// What was asked for.
         asked: f64,
-        /// The estimated error of the motion, as [`Estimated::error_estimate`](crate::accuracy::Estimated::error_estimate) measures it, but no less than a rounding.
+        /// The estimated error of the motion, measured as
+        /// [`Estimated::error_estimate`](crate::accuracy::Estimated::error_estimate) says, but not less than the
+        /// rounding unit.
         estimate: f64,
-        /// The last time up to which it is as small as asked; `None` where it is larger from the first comparison on.
+        /// The last time up to which the estimate is as small as asked; `None` if it is larger from the first
+        /// comparison on.
         until: Option<f64>,
     },
     /// A loss names an output that the model does not declare.
     NoOutput {
         /// The name asked for.
         name: String,
-        /// Those that there are.
+        /// The outputs that the model declares.
         known: Vec<String>,
     },
-    /// A loss whose values or derivatives cannot be used.
+    /// The values or derivatives of a loss cannot be used.
     Loss {
         /// An output, the parameter by which it is differentiated, or `start`.
         name: String,
@@ -62,30 +69,31 @@ pub enum RunErrorKind {
         /// The end asked for.
         end: f64,
     },
-    /// The span holds more steps than can be counted, or an accuracy would take more than ten million of them.
+    /// The span holds more steps than can be counted, or an accuracy would take more than ten million steps.
     TooManySteps {
         /// Length of the span.
         span: f64,
         /// The step asked for.
         step: f64,
     },
-    /// The step is so short beside the time itself that nodes would share times: the time has 53 bits.
+    /// The step is so short compared with the time itself that successive nodes would have the same time, because a
+    /// time has 53 bits. Measure the time from an origin near the motion.
     StepUnresolved {
         /// The largest time of the span.
         time: f64,
         /// The step asked for.
         step: f64,
-        /// The least step at that time.
+        /// The shortest step that can be resolved at that time.
         least: f64,
     },
-    /// A node is not finite or does not lie beyond the one before it, in the direction of the run.
+    /// The time of a node is not finite, or does not lie beyond that of the node before, in the direction of the run.
     NodeOrder {
         /// Which node, the first one 0.
         node: usize,
         /// Its time.
         time: f64,
     },
-    /// The nodes do not begin and end with the span.
+    /// The first and the last node are not the ends of the span.
     NodeEnds {
         /// The first node; `None` where there are none.
         first: Option<f64>,
@@ -96,7 +104,7 @@ pub enum RunErrorKind {
         /// Its end.
         end: f64,
     },
-    /// A start value is not finite.
+    /// A coordinate or momentum of the start is not finite.
     Start {
         /// Which coordinate.
         coordinate: usize,
@@ -105,41 +113,43 @@ pub enum RunErrorKind {
         /// Its momentum.
         p: f64,
     },
-    /// The start is not on the constraints.
+    /// The start violates the constraints. [`ConsistentState`](crate::ConsistentState) finds consistent initial
+    /// conditions.
     Inconsistent {
         /// Its time.
         time: f64,
-        /// By how much it violates each of them.
+        /// The violation of each constraint.
         residuals: Vec<Residual>,
     },
-    /// An impulse acts at a time outside the span, or is not finite.
+    /// An impulse acts at a time outside the span, or its time or a component is not finite.
     Impulse {
         /// When it was to act.
         time: f64,
     },
-    /// Something was asked for that models of this kind cannot do.
+    /// The call is not supported for this kind of model (see `docs/calls.md`).
     Unsupported {
         /// The call.
         call: &'static str,
         /// The kind of models.
         of: &'static str,
     },
-    /// The model declares no event or output of a name.
+    /// The model declares no event or output of this name.
     NoEvent {
         /// The name asked for.
         name: String,
         /// Those that there are.
         known: Vec<String>,
     },
-    /// An event came a thousand times within one step, or twice within a millionth of it, or forces press a motion through the surface on which an [impact](crate::Occurrence::after_impact) has stopped
-    /// it: the motion comes to rest there.
+    /// Infinitely many events follow each other in a finite time, because the motion comes to rest on the surface of
+    /// the event: an event happened a thousand times within one step, or twice within a millionth of a step, or forces
+    /// press the motion through the surface on which an [impact](crate::Occurrence::after_impact) has stopped it.
     EventsWithoutEnd {
-        /// The output that changes its sign.
+        /// The event.
         name: String,
-        /// When.
+        /// The time at which the run stopped.
         time: f64,
     },
-    /// A parameter was to be set that the model does not have.
+    /// A parameter that was to be set, or by which to differentiate, does not exist in the model.
     NoParameter {
         /// The name asked for.
         name: String,
@@ -153,37 +163,41 @@ pub enum RunErrorKind {
         /// What it was set to.
         value: f64,
     },
-    /// Parameters were to be set of a model of which no other can be made: kernels written by hand that do not say how, or a field that cannot be copied.
+    /// Parameters were to be changed of a model that cannot be copied with other parameters: its kernels are written
+    /// by hand and do not say how, or it has a field that cannot be copied.
     ParametersFixed,
-    /// An event set parameters in a run with derivatives by parameters, which would have to know how the new values depend on the old ones.
+    /// An event set parameters in a run with derivatives with respect to parameters, which cannot know how the new
+    /// values depend on the old ones.
     SetUnsupported {
         /// What was called.
         call: &'static str,
     },
-    /// An event set a parameter to a value that depends on the state at the event, or on its time if that does, in a run with transition matrices. These go from state to state, and the motion behind
-    /// the event is a function of the parameter, too. A coordinate can take its place: one whose momentum does not appear in the Hamiltonian is constant until [`Act::Restart`](crate::Act::Restart)
-    /// changes it, and is differentiated as all are.
+    /// An event set a parameter to a value that depends on the state at the event, or on a time of the event that
+    /// depends on the state, in a run with transition matrices. These hold derivatives with respect to the state only,
+    /// and after the event the motion depends on the parameter, too. Use a coordinate in place of the parameter: one
+    /// whose momentum does not appear in the Hamiltonian is constant until [`Act::Restart`](crate::Act::Restart)
+    /// changes it, and is differentiated as every coordinate is.
     SetByState {
         /// The event.
         event: String,
-        /// When it came.
+        /// The time of the event.
         time: f64,
-        /// What it set.
+        /// The parameter that it set.
         parameter: String,
     },
-    /// An input that the model does not have, or that is none.
+    /// The model does not have this input, or its values cannot be used.
     Input(InputError),
-    /// An earlier step failed: nothing goes on from here.
+    /// An earlier step failed, so that the run cannot continue.
     Ended {
         /// The last node.
         time: f64,
     },
-    /// Steps were to be cut at kinks by something that cannot.
+    /// The call cannot be used with steps that are cut at [kinks](crate::Simulation::at_kinks).
     KinksUnsupported {
         /// What was called.
         call: &'static str,
     },
-    /// An element could not be solved.
+    /// The equations of an element could not be solved.
     Solve {
         /// The number of the element, from 0.
         element: usize,
@@ -194,7 +208,7 @@ pub enum RunErrorKind {
         /// Why.
         source: StepError,
     },
-    /// An element was solved, but has no transition matrix.
+    /// An element was solved, but has no transition matrix (no derivative).
     Transition {
         /// The number of the element, from 0.
         element: usize,

@@ -1,4 +1,4 @@
-//! A motion with its linearisation: the transition matrix of every element.
+//! Motions with the transition matrix of every element.
 
 use crate::length::{FixedLength, Length};
 use crate::motion::Motion;
@@ -6,16 +6,17 @@ use crate::periodic_schur::{self, Multiplier, PeriodicSchurError};
 use nalgebra::DMatrix;
 use tfe_runtime::StepError;
 
-/// A motion together with the transition matrices of its elements, from
+/// A motion together with the transition matrices of its elements, made by
 /// [`Simulation::run_linearised`](crate::Simulation::run_linearised).
 ///
-/// With y = (p, q) and A_e the derivative of the step over element e at the motion,
+/// With y = (p, q), and A_e the derivative of the end of element e with respect to its start,
 ///
 /// ```text
 /// δy_{e+1} = A_e δy_e ,      δy_end = A_{N−1} ⋯ A₁ A₀ δy_start .                                     (T-83)
 /// ```
 ///
-/// It is the derivative of the numbers that the run computes, not an approximation of the linearised differential equation.
+/// The matrices are the derivative of the computed motion, exact up to rounding; they do not approximate the
+/// linearised differential equation separately.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -71,17 +72,20 @@ impl<const N: usize, L: Length<N>> Linearised<N, L> {
         &self.motion
     }
 
-    /// The transition matrices, one an element in the order of the run, each 2N × 2N and ordered (p, q).
+    /// The transition matrices, one for each element in the order of the run, 2N × 2N each, ordered (p, q).
     ///
-    /// One for every element, also where [`record_every`](crate::Simulation::record_every) keeps only some of the nodes.
+    /// There is one for every element, even if [`record_every`](crate::Simulation::record_every) keeps only some of
+    /// the nodes.
     pub fn transitions(&self) -> &[DMatrix<f64>] {
         &self.transitions
     }
 
-    /// The transition matrices of a model with constraints on the motions that these allow, each in the orthonormal bases
-    /// [`tangent_basis`](crate::constraints::tangent_basis) at the two nodes of its element (the last one back to that of the start, where a periodic
-    /// motion ends): no direction that violates a constraint, and no zero eigenvalue for it. `None` for models without constraints, and where there is
-    /// no basis.
+    /// For a model with constraints, the transition matrices restricted to the variations that the constraints allow;
+    /// `None` for models without constraints, and if there is no basis.
+    ///
+    /// Each matrix is in the orthonormal bases [`tangent_basis`](crate::constraints::tangent_basis) at the two nodes
+    /// of its element, so that no direction violates a constraint and no zero eigenvalue belongs to one. If the motion
+    /// is periodic, the last matrix leads back to the basis of the start.
     pub fn on_constraints(&self) -> Option<&[DMatrix<f64>]> {
         let reduced = self.reduced.as_ref()?.as_deref().ok()?;
         reduced.get(..self.transitions.len())
@@ -92,25 +96,29 @@ impl<const N: usize, L: Length<N>> Linearised<N, L> {
         (self.motion, self.transitions)
     }
 
-    /// The derivative of the end by the start: the product of all transition matrices, the first one to the right. The identity for an empty span.
+    /// The derivative of the end of the motion with respect to its start: the product of all transition matrices, the
+    /// first one on the right; the identity for an empty span.
     ///
     /// Over one period of a periodic motion it is the monodromy matrix.
     ///
     /// # Not guaranteed
-    /// Where some directions grow and others decay by more than ten orders of magnitude the product holds the growing ones only, and
-    /// beyond 10³⁰⁸ its entries are infinite or NaN: use [`multipliers`](Self::multipliers), which does not form it.
+    /// If some directions grow and others decay by more than ten orders of magnitude relative to each other, rounding
+    /// leaves only the growing ones in the product; beyond 10³⁰⁸ its entries are infinite or NaN. Use
+    /// [`multipliers`](Self::multipliers), which does not form the product.
     pub fn product(&self) -> DMatrix<f64> {
         let identity = DMatrix::identity(self.size(), self.size());
         (self.transitions.iter()).fold(identity, |product, a| a * product)
     }
 
-    /// The eigenvalues of the [`product`](Self::product), largest modulus first, without forming it: tiny ones beside huge ones keep
-    /// their digits, and none over- or underflows.
+    /// The eigenvalues of the [`product`](Self::product), in order of decreasing modulus, computed without forming it
+    /// (periodic Schur form): very small eigenvalues beside very large ones keep their digits, and there is no
+    /// overflow or underflow.
     ///
-    /// Over one period of a periodic motion they are its Floquet multipliers. Over a span that ends elsewhere they depend on the
+    /// Over one period of a periodic motion these are its Floquet multipliers. Over any other span they depend on the
     /// coordinates and have no such meaning.
     ///
-    /// Of a model with constraints they are those of the motions that these allow, from [`on_constraints`](Self::on_constraints).
+    /// For a model with constraints, the eigenvalues are those of the motions that the constraints allow, from
+    /// [`on_constraints`](Self::on_constraints).
     ///
     /// # Errors
     /// [`PeriodicSchurError`] if a matrix is not finite or the iteration does not converge.

@@ -34,16 +34,18 @@ use std::ops::Range;
 use std::path::Path;
 use tfe_runtime::{CoordinateName, Statistics};
 
-/// A state with its time: of arrays, or of vectors where the length is known at run time only.
+/// A state with its time and its velocities. The vectors are arrays for models of fixed size, and `Vec`s for models of
+/// run-time length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node<const N: usize, L: Length<N> = FixedLength> {
-    /// Time.
+    /// Time t, in the unit of the model.
     pub t: f64,
-    /// Generalized coordinates.
+    /// Generalized coordinates q.
     pub q: L::Vector,
     /// Generalized momenta p = ∂L/∂v.
     pub p: L::Vector,
-    /// Velocities dq/dt: those of the state at nodes, NaN where no velocity belongs to the momentum; between nodes the derivative of the polynomial.
+    /// Velocities dq/dt. At a node they are the velocities that belong to the momenta, or NaN if there are none;
+    /// between nodes the derivative of the element's polynomial.
     pub v: L::Vector,
 }
 
@@ -66,7 +68,7 @@ impl<const N: usize, L: Length<N>> Node<N, L> {
         Self::of(t, state, velocity.unwrap_or_else(|| L::unknown(guess)))
     }
 
-    /// The point of phase space, without the time.
+    /// The state (q, p), without the time.
     pub fn state(&self) -> L::State {
         L::state(self.q.clone(), self.p.clone())
     }
@@ -77,7 +79,8 @@ impl<const N: usize, L: Length<N>> Node<N, L> {
     }
 }
 
-/// The observables that a model declares by `output(name) = …` or, with one column for each site, by `output(name[i in a..b]) = …`; one row a recorded node.
+/// The values of the observables that a model declares by `output(name) = …` or, with one column for each site, by
+/// `output(name[i in a..b]) = …`: a table with one row for each recorded node.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outputs {
     names: Vec<CoordinateName>,
@@ -85,12 +88,13 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// The names of the columns, in the order of declaration and of sites: `strain[0]`, `strain[1]`, … where they have any.
+    /// The names of the columns, in the order of declaration; outputs with sites are called `strain[0]`, `strain[1]`,
+    /// …
     pub fn names(&self) -> &[CoordinateName] {
         &self.names
     }
 
-    /// The values of one column at the recorded nodes; `None` where the model declares no such name.
+    /// The values of one output at the recorded nodes; `None` if the model declares no output of this name.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let is_it = |candidate: &CoordinateName| candidate.to_string() == name;
         let at = self.names.iter().position(is_it)?;
@@ -98,19 +102,22 @@ impl Outputs {
         Some(values.step_by(self.names.len()).copied().collect())
     }
 
-    /// All columns at one recorded node, in the order of [`names`](Self::names); `None` beyond the last node, if there are columns.
+    /// The values of all outputs at one recorded node, in the order of [`names`](Self::names); `None` if there is no
+    /// such node and the model has outputs.
     pub fn row(&self, node: usize) -> Option<&[f64]> {
         row_of(&self.values, self.names.len(), node)
     }
 }
 
-/// A recorded motion of a model with `N` coordinates, or of one of run-time length.
+/// The result of a run: the recorded motion of a model with `N` coordinates, or of a model of run-time length.
 ///
 /// The nodes are the ends of the elements (every one, or every k-th after
-/// [`record_every`](crate::Simulation::record_every)); between nodes, [`at`](Self::at) evaluates the element's own polynomial.
+/// [`record_every`](crate::Simulation::record_every)). Between the nodes, [`at`](Self::at) evaluates the element's own
+/// polynomial (dense output).
 ///
-/// A node of a model of run-time length keeps 4 n numbers for n coordinates, the polynomial of an element of s stages 2 s n more: for long chains and long runs, `record_every` leaves nodes and
-/// polynomials out.
+/// For a model of run-time length with n coordinates each node takes 4 n numbers of memory, and the polynomial of an
+/// element with s stages 2 s n more. For long chains and long runs, use `record_every` to keep fewer nodes and no
+/// polynomials.
 #[derive(Clone)]
 pub struct Motion<const N: usize, L: Length<N> = FixedLength> {
     nodes: Vec<Node<N, L>>,
@@ -293,8 +300,9 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.is_stopped
     }
 
-    /// Where the run ended, with all that [`Simulation::resume`](crate::Simulation::resume) needs to go on as if it had never stopped; `None` where the run failed, an event has ended it or set
-    /// parameters, or it was made of several ([`accuracy`](crate::Simulation::accuracy)).
+    /// The end of the run, with everything that [`Simulation::resume`](crate::Simulation::resume) needs to continue
+    /// with the same bits as an uninterrupted run. `None` if the run failed, if an event ended it or set parameters,
+    /// or if the motion is made of several runs ([`accuracy`](crate::Simulation::accuracy)).
     pub fn checkpoint(&self) -> Option<&Checkpoint<N, L>> {
         self.checkpoint.as_deref()
     }
@@ -311,7 +319,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.warnings = warnings;
     }
 
-    /// The last recorded node: the end of the span after a complete run.
+    /// The last recorded node. After a complete run, this is the end of the span.
     pub fn last(&self) -> &Node<N, L> {
         self.nodes.last().expect("a motion is made with its start")
     }
@@ -346,7 +354,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         }
     }
 
-    /// The recorded nodes, in the order of the run, which may go back in time.
+    /// The recorded nodes, in the order of the run. Times decrease in a run backwards in time.
     pub fn states(&self) -> &[Node<N, L>] {
         &self.nodes
     }
@@ -367,14 +375,18 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         &self.energies
     }
 
-    /// The state at a time between the nodes, from the element's own polynomial.
+    /// The state at any time within the span (dense output), from the polynomial of the element that contains it.
     ///
-    /// The polynomial starts at one node and ends at the next, so the result is continuous, but for momenta where impulses act at a node, which shows those before; between nodes its error is of order hⁿ for an
-    /// element of n nodes, while the nodes themselves are accurate to the order of the element. So it is with constraints: at nodes they hold to round-off,
-    /// between them to the order hⁿ; [`consistent_state_at`](crate::ConsistentState::consistent_state_at) projects such a state where that matters.
+    /// The polynomial starts at one node and ends at the next, so the result is continuous, except for the momenta at
+    /// nodes where impulses act: there it shows the momenta before the impulse. Between the nodes the error is of
+    /// order hⁿ for an element of n nodes, while the nodes themselves have the order of the element. In the same way,
+    /// constraints hold to rounding at the nodes, and with an error of order hⁿ between them;
+    /// [`consistent_state_at`](crate::ConsistentState::consistent_state_at) projects a state onto the constraints
+    /// where that matters.
     ///
     /// # Errors
-    /// [`AtError::Outside`] beyond the span, [`AtError::NotRecorded`] where `record_every` left the element out.
+    /// [`AtError::Outside`] if the time is outside the span, [`AtError::NotRecorded`] if `record_every` left out the
+    /// element.
     pub fn at(&self, time: f64) -> Result<Node<N, L>, AtError> {
         let (start, end) = (self.nodes[0].t, self.last().t);
         if !((start.min(end)..=start.max(end)).contains(&time)) {
@@ -409,8 +421,9 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// ∫ y(t, q, q̇) dt ,     by the s Gauss points of every element, s the degree of its polynomial                   (T-164)
     /// ```
     ///
-    /// An element of collocation meets the equations of motion at these points, so the integral is as accurate as the nodes: as if it had been one more
-    /// coordinate. So the angle comes back that `model(Name, routh(phi))` ignores, whose velocity is the output `phi_rate`; so does the work of a force.
+    /// The Gauss points of a collocation element are the points at which it satisfies the equations of motion. The
+    /// integral is therefore as accurate as the nodes, as if it had been one more coordinate. Use it for the work of a
+    /// force, or for the angle that `model(Name, routh(phi))` eliminates, whose velocity is the output `phi_rate`:
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -436,8 +449,8 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// ```
     ///
     /// # Errors
-    /// [`AtError::NoOutput`] for a name that is none, [`AtError::NotRecorded`] where `record_every` left elements out, [`AtError::NoVelocity`] where a
-    /// momentum belongs to no velocity.
+    /// [`AtError::NoOutput`] if the model declares no such output, [`AtError::NotRecorded`] if `record_every` left out
+    /// elements, [`AtError::NoVelocity`] if no velocity belongs to a momentum.
     pub fn integral<M>(&self, model: &M, output: &str) -> Result<Vec<f64>, AtError>
     where
         M: Evaluate<N, L>,
@@ -489,15 +502,17 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         Ok(integrals)
     }
 
-    /// Largest change of the energy over the recorded nodes, relative to the energy at the start (absolute where that is zero, or not more than a rounding beside p·v):
+    /// The largest change of the energy over the recorded nodes, relative to the energy at the start (absolute if that
+    /// is zero, or no more than a rounding error of p·v):
     ///
     /// ```text
     /// max |H(t) − H(t₀)| / |H(t₀)|
     /// ```
     ///
-    /// Where [events](crate::Simulation::on) changed the state or parameters, H(t) − H of the start of its [arc](Self::arcs).
+    /// If [events](crate::Simulation::on) changed the state or parameters, each node is compared with the start of its
+    /// [arc](Self::arcs).
     ///
-    /// Of a model that is forced, damped or depends on time it measures physics, not error.
+    /// For a model that is forced, damped or depends on time, this is a property of the motion and not an error.
     pub fn energy_error(&self) -> f64 {
         let Some(&start) = self.energies.first() else {
             return 0.0;
@@ -513,14 +528,16 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         changes.map(|change| change / scale).fold(0.0, larger)
     }
 
-    /// What the run cost.
+    /// What the run cost: counts of steps, iterations, evaluations and factorisations.
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
     }
 
-    /// What is doubtful about the motion although no element failed; each can be printed.
+    /// Signs that the motion may be wrong although no element failed. Each warning can be printed, and says what to
+    /// do.
     ///
-    /// None is no proof that the motion is right: [`Warning`] says what is looked for, and how often.
+    /// The absence of warnings does not prove that the motion is right: [`Warning`] says what is checked, and how
+    /// often.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
@@ -534,12 +551,13 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         &self.events
     }
 
-    /// The arcs between the events at which the state or parameters changed; one where there were none.
+    /// The arcs of the motion: its parts between events that changed the state or parameters. Without such events
+    /// there is one.
     pub fn arcs(&self) -> impl Iterator<Item = MotionArc> {
         self.arcs.all(self.nodes.len(), self.statistics)
     }
 
-    /// The parameters that events have set, in the order in which they did.
+    /// The parameters that events have set, in the order in which they were set.
     pub fn settings(&self) -> &[Setting] {
         self.arcs.settings()
     }
@@ -563,24 +581,28 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         }
     }
 
-    /// The observables at the recorded nodes.
+    /// The outputs of the model at the recorded nodes.
     pub fn outputs(&self) -> &Outputs {
         &self.outputs
     }
 
-    /// The reactions of the constraints at the recorded nodes; NaN where the kinetic energy is singular for motions that the constraints allow.
+    /// The reactions (Lagrange multipliers λ) of the constraints at the recorded nodes; NaN where the mass matrix is
+    /// singular for motions that the constraints allow.
     pub fn reactions(&self) -> &Reactions<L::ConstraintName> {
         &self.reactions
     }
 
-    /// What the recorded nodes leave of the constraints.
+    /// The largest violation of the constraints over the recorded nodes.
     pub fn constraint_residual(&self) -> ConstraintResidual {
         self.residual
     }
 
-    /// Writes the recorded nodes as CSV: time, coordinates, velocities, momenta, energy, observables, reactions, with a header line. Numbers are
-    /// written so that they read back exactly. With a time transformation the first column is `tau`, and `t` is among the coordinates. Where the model
-    /// has an output `energy`, that is the column `energy`, and the energy is `energy_`; likewise for other names that coordinates or outputs have.
+    /// Writes the recorded nodes as CSV: time, coordinates, velocities, momenta, energy, outputs, reactions, with a
+    /// header line. Numbers are written so that they read back exactly.
+    ///
+    /// With a time transformation the first column is `tau`, and `t` is among the coordinates. If the model has an
+    /// output called `energy`, that output keeps the name, and the energy is the column `energy_`; the same holds for
+    /// other names that a coordinate or an output already has.
     ///
     /// # Errors
     /// Those of the file system.

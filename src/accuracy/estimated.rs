@@ -5,9 +5,10 @@ use std::fmt;
 use std::ops::Deref;
 use tfe_runtime::{Element, Solve, Statistics};
 
-/// A motion with an estimate of its error; everything that a motion can be asked, it can be asked too.
+/// A motion with an estimate of its error; dereferences to [`Motion`](crate::Motion).
 ///
-/// Made by [`Simulation::run_estimated`](crate::Simulation::run_estimated) and [`Simulation::accuracy`](crate::Simulation::accuracy), where the examples are.
+/// Made by [`Simulation::run_estimated`](crate::Simulation::run_estimated) and
+/// [`Simulation::accuracy`](crate::Simulation::accuracy), which have examples.
 #[derive(Clone, Debug)]
 pub struct Estimated<T> {
     motion: T,
@@ -35,16 +36,17 @@ impl<T> Estimated<T> {
         }
     }
 
-    /// The largest estimated error over the span: of coordinates over the largest coordinate, of momenta over the largest momentum, of each declared output
-    /// over its largest value, whichever is largest.
+    /// The largest estimated relative error over the span: the error of the coordinates divided by the largest
+    /// coordinate, of the momenta divided by the largest momentum, and of each declared output divided by its largest
+    /// value, whichever is largest.
     ///
-    /// Infinite where the motion it was compared with is not finite.
+    /// Infinite if the motion with which this one was compared is not finite.
     pub fn error_estimate(&self) -> f64 {
         self.errors.iter().flatten().copied().fold(0.0, larger)
     }
 
-    /// The estimated error at each time at which it was estimated, the end of the span the last: (t, error), measured as by
-    /// [`error_estimate`](Self::error_estimate).
+    /// The estimated error at each time at which the two motions were compared, as pairs (t, error); the last is the
+    /// end of the span. The error is relative, as in [`error_estimate`](Self::error_estimate).
     pub fn error_estimates(&self) -> impl Iterator<Item = (f64, f64)> {
         self.times.iter().enumerate().map(|(k, t)| {
             let here = self.errors.iter().map(|kind| kind[k]);
@@ -52,7 +54,8 @@ impl<T> Estimated<T> {
         })
     }
 
-    /// The largest estimated error of one declared output over its largest value; `None` where the model declares no such name.
+    /// The largest estimated error of one declared output, divided by the largest value of that output; `None` if the
+    /// model declares no output of this name.
     pub fn error_estimate_of(&self, output: &str) -> Option<f64> {
         let at = self.outputs.iter().position(|name| name == output)?;
         // After coordinates and momenta.
@@ -60,8 +63,8 @@ impl<T> Estimated<T> {
         Some(errors.iter().copied().fold(0.0, larger))
     }
 
-    /// The last time up to which the estimated error stays at or below `limit`; `None` where it is larger from the first time on. Of a chaotic motion: how far
-    /// it can be trusted.
+    /// The last time up to which the estimated error stays at or below `limit`; `None` if it is larger from the first
+    /// comparison on. For a chaotic motion, this is how far it can be trusted.
     pub fn horizon(&self, limit: f64) -> Option<f64> {
         let within = self
             .error_estimates()
@@ -69,17 +72,17 @@ impl<T> Estimated<T> {
         within.last().map(|(t, _)| t)
     }
 
-    /// What was picked and why; `None` where element and step were given, and for an empty span.
+    /// What was chosen and why; `None` if the element and the step size were given, and for an empty span.
     pub fn picked(&self) -> Option<&Picked> {
         self.picked.as_ref()
     }
 
-    /// The motion alone.
+    /// The motion without its error estimate.
     pub fn motion(&self) -> &T {
         &self.motion
     }
 
-    /// The motion alone, by value.
+    /// The motion without its error estimate, by value.
     pub fn into_motion(self) -> T {
         self.motion
     }
@@ -93,40 +96,45 @@ impl<T> Deref for Estimated<T> {
     }
 }
 
-/// Element, step, tolerance and solver that [`Simulation::accuracy`](crate::Simulation::accuracy) picked: a run of one's own with them is as accurate. `Display` says them with the reason.
+/// The element, step size, tolerance and solver that [`Simulation::accuracy`](crate::Simulation::accuracy) chose. A
+/// run with these settings is as accurate. `Display` prints them with the reason for the choice.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picked {
     /// The element.
     pub element: Element,
-    /// The step, positive; where steps vary, or breaks cut the span, the longest one.
+    /// The step size, positive; if steps vary or breaks cut the span, the longest step.
     pub step: f64,
-    /// The shortest step.
+    /// The shortest step, positive.
     pub shortest: f64,
-    /// The tolerance of the iteration inside elements.
+    /// The tolerance of the iteration inside elements, relative to the state.
     pub tolerance: f64,
-    /// How its equations were solved: by [`Solve::FixedPoint`] where that contracts in all steps, else as the simulation was told.
+    /// How the equations of elements were solved: by [`Solve::FixedPoint`] if that converges in all steps, otherwise
+    /// as set in the simulation.
     pub solve: Solve,
-    /// What was asked for.
+    /// The accuracy asked for.
     pub accuracy: f64,
-    /// The estimated error.
+    /// The estimated error of the motion.
     pub error_estimate: f64,
-    /// The runs over the whole span, in their order; the last one is the motion.
+    /// The runs over the whole span, in order; the last one is the motion.
     pub attempts: Vec<Attempt>,
-    /// What all steps of the search have cost: of probes, of a pilot run, of all runs, and of the one that verifies the last. The motion's own [`Statistics`] are those of the last run.
+    /// The cost of all steps of the search: probes, a pilot run, all runs, and the one for verification. The motion's
+    /// own [`Statistics`] are those of the last run alone.
     pub work: Statistics,
 }
 
-/// One run of a search.
+/// One run of the search for a step size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attempt {
-    /// Its longest step.
+    /// The longest step of this run.
     pub step: f64,
-    /// Its estimated error, from the run that followed (of the last one, from the run before); `None` where it stopped.
+    /// The estimated error of this run, from the run that followed (for the last run, from the one before); `None` if
+    /// the run failed.
     pub error_estimate: Option<f64>,
 }
 
 impl Picked {
-    /// Whether steps are short where the motion is fast, by more than a span that is no whole number of steps makes them.
+    /// Whether step sizes were varied on purpose, short where the motion is fast; not if only the last step of a span
+    /// is shorter than the others.
     pub fn varies(&self) -> bool {
         self.step > 2.0 * self.shortest
     }

@@ -3,18 +3,18 @@
 use std::error::Error;
 use std::fmt;
 
-/// What is wrong with an input.
+/// Why an input of a model cannot be used.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum InputError {
-    /// The model declares no input of a name.
+    /// The model declares no input of this name.
     Unknown {
         /// The name asked for.
         name: String,
         /// Those that there are.
         known: Vec<&'static str>,
     },
-    /// A function that gave a number that is not finite, so that an element could not be solved.
+    /// The function of an input returned a number that is not finite, so that an element could not be solved.
     Value {
         /// The input.
         name: String,
@@ -23,12 +23,13 @@ pub enum InputError {
         /// What it gave.
         value: f64,
     },
-    /// A function panicked. What it said is on standard error, or where the program's panic hook puts it.
+    /// The function of an input panicked. The message of the panic is on standard error, or where the program's panic
+    /// hook puts it.
     Panicked {
         /// Where the element begins that asked it, or the run.
         time: f64,
     },
-    /// Sampled feedback that cannot be.
+    /// Sampled feedback whose period, name or time of sampling is invalid.
     Sampling {
         /// The input.
         name: String,
@@ -37,14 +38,14 @@ pub enum InputError {
         /// What is wrong with it.
         why: &'static str,
     },
-    /// A number that is not finite.
+    /// An input was set to a number that is not finite.
     NotFinite {
         /// The input.
         name: String,
         /// What it was set to.
         value: f64,
     },
-    /// A table that is none.
+    /// The table of an input is invalid.
     Table {
         /// The input.
         name: String,

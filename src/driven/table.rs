@@ -1,14 +1,14 @@
 //! Values at given times, and what lies between.
 
-/// How an input goes from one value of a table to the next.
+/// How an input is interpolated between the times of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
-    /// It keeps its value until the next time: zero-order hold.
+    /// The input keeps each value until the next time (zero-order hold).
     Hold,
-    /// Straight lines.
+    /// Linear interpolation.
     Linear,
-    /// A cubic spline with continuous second derivatives, whose first two pieces are one cubic, and its last two ("not a knot"); of three values the parabola through
-    /// them, of two the line.
+    /// A cubic spline with continuous second derivatives and the not-a-knot condition: its first two pieces are one
+    /// cubic, and so are its last two. Three values give a parabola, two a line.
     Spline,
 }
 

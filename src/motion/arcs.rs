@@ -5,23 +5,26 @@ use crate::length::Length;
 use std::ops::Range;
 use tfe_runtime::Statistics;
 
-/// A part of a motion between two changes of the state or of parameters, from [`Motion::arcs`](crate::Motion::arcs).
+/// A part of a motion between two changes of the state or of parameters by events; from
+/// [`Motion::arcs`](crate::Motion::arcs).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MotionArc {
-    /// Its recorded nodes: the first is the state after the event at which it begins, the last the state before that at which it ends.
+    /// The indices of its recorded nodes. The first is the state after the event at which the arc begins, the last the
+    /// state before the event at which it ends.
     pub nodes: Range<usize>,
-    /// What it cost. Elements that end at events are solved a few times over; those solutions are not counted.
+    /// What the arc cost. Elements that end at an event are solved several times while the event is located; these
+    /// solutions are not counted.
     pub statistics: Statistics,
 }
 
 /// A parameter that an event has set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// When.
+    /// The time of the event.
     pub t: f64,
-    /// The first recorded node with the new value: the second one of the two at this time.
+    /// The index of the first recorded node with the new value: of the two nodes at this time, the second.
     pub node: usize,
-    /// The parameter, as the model calls it.
+    /// The parameter's name in the model.
     pub parameter: String,
     /// Its new value.
     pub value: f64,

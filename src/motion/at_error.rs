@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt;
 
-/// Why a motion has no value at a time.
+/// Why a motion cannot be evaluated at a time, or an output of it be integrated.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AtError {
@@ -16,19 +16,19 @@ pub enum AtError {
         /// Last time of the motion.
         end: f64,
     },
-    /// The element around the time was not recorded (`record_every` keeps only some).
+    /// The element that contains the time was not recorded (`record_every` keeps only some).
     NotRecorded {
         /// The time asked for.
         time: f64,
     },
-    /// The model has no output of this name.
+    /// The model declares no output of this name.
     NoOutput {
         /// The name asked for.
         output: String,
         /// The outputs that there are.
         known: Vec<String>,
     },
-    /// The momentum at this time belongs to no velocity.
+    /// No velocity belongs to the momentum at this time: the mass matrix is singular there.
     NoVelocity {
         /// The time.
         time: f64,

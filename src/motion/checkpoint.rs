@@ -2,9 +2,11 @@
 
 use crate::length::{FixedLength, Length};
 
-/// The end of a run, with all that the next step depends on: the state to more than its rounded numbers, the polynomial of the last element, factors of its matrix, the grid.
+/// The end of a run, with everything on which the next step depends: the state with more digits than its rounded
+/// numbers, the polynomial of the last element, the factors of its matrix, the grid of steps.
 ///
-/// One run and two halves of it are the same to the last bit: [`Simulation::resume`](crate::Simulation::resume). It belongs to the model, with the same parameters, and holds the memory of a
+/// With it, [`Simulation::resume`](crate::Simulation::resume) continues the run such that both parts together have the
+/// same bits as one run. A checkpoint belongs to its model and that model's parameters. It holds the memory of a
 /// stepper, some kilobytes for a few coordinates.
 #[derive(Clone, Debug)]
 pub struct Checkpoint<const N: usize, L: Length<N> = FixedLength> {
@@ -16,12 +18,12 @@ pub struct Checkpoint<const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> Checkpoint<N, L> {
-    /// The time that the run has reached.
+    /// The time at which the run ended.
     pub fn time(&self) -> f64 {
         self.reached.time
     }
 
-    /// The state there.
+    /// The state at that time.
     pub fn state(&self) -> &L::State {
         &self.state
     }

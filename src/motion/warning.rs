@@ -4,18 +4,21 @@ use crate::numbers::Short;
 use std::fmt;
 use tfe_runtime::Element;
 
-/// What is doubtful about a motion that was computed without an error.
+/// A sign that a motion may be wrong although it was computed without an error.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
-    /// The step lies in an unstable interval of the linearised model: the method grows where the model does not.
+    /// The step size lies in an unstable interval of the element for the linearised model: the numerical solution
+    /// grows where the exact one does not.
     ///
-    /// The second derivatives of the model are held at their values at a visited state; the transition matrix of the element
-    /// for this linear model has an eigenvalue of modulus `radius`, where the linear model itself moves by `exact` in the same
-    /// time. Nonlinear motions leave such a neighbourhood sooner or later, and then the amplitude or the energy is wrong.
+    /// The model is linearised at a state of the motion (its second derivatives are held constant). The transition
+    /// matrix of the element for this linear model has an eigenvalue of modulus `radius`, whereas the linear model
+    /// itself multiplies the mode by `exact` in the same time. A nonlinear motion leaves such a neighbourhood sooner
+    /// or later, and then its amplitude or its energy is wrong.
     ///
-    /// Looked for at the start, in elements 1, 2, 4, 8, … and where a run fails, so that a long run costs no more; several in
-    /// a row are one warning. Elements that are stable at every step ([`Element::is_a_stable`]) are not examined, nor are models with constraints or of run-time length.
+    /// Checked at the start, in elements 1, 2, 4, 8, … and where a run fails, so that the cost in a long run is small;
+    /// several findings in a row make one warning. Not checked for elements that are stable at every step size
+    /// ([`Element::is_a_stable`]), for models with constraints, and for models of run-time length.
     UnstableStep {
         /// Where the first such element begins.
         time: f64,
@@ -28,10 +31,12 @@ pub enum Warning {
         /// The factor |e^{λh}| by which the linear model amplifies it.
         exact: f64,
     },
-    /// The mass matrix ∂²L/∂v² at the start has eigenvalues of both signs: forces speed up where they should slow down, mostly for a wrong sign in the Lagrangian.
+    /// The mass matrix ∂²L/∂v² at the start has eigenvalues of both signs, so that some forces accelerate against
+    /// their direction; usually because of a wrong sign in the kinetic energy.
     ///
-    /// Looked for at the start of a run, for Lagrangians without constraints, with the unit of each coordinate such that its own mass is one. Of models of run-time length with more than 64 coordinates
-    /// that are coupled by their masses, every coordinate and every two that are coupled are looked at.
+    /// Checked at the start of a run, for Lagrangians without constraints, with each coordinate scaled such that its
+    /// own mass is one. For models of run-time length with more than 64 coordinates that are coupled by their masses,
+    /// only single coordinates and coupled pairs are checked.
     MassIndefinite {
         /// The start.
         time: f64,
@@ -40,15 +45,17 @@ pub enum Warning {
         /// The largest one, or such a number above zero.
         largest: f64,
     },
-    /// The energy at a node is not finite: the momentum belongs to no velocity there (the mass matrix is singular), or the model has a singular point.
+    /// The energy at a node is not finite: no velocity belongs to the momentum there (the mass matrix is singular), or
+    /// the model has a singular point.
     EnergyNotFinite {
         /// The first such node.
         time: f64,
     },
-    /// The energy of a model that conserves it changes between two nodes by more than a tenth of the kinetic energy that the motion has had: the step is too long for
-    /// the motion, or the motion has passed a singular point.
+    /// The model conserves the energy, but between two nodes it changes by more than a tenth of the largest kinetic
+    /// energy so far: the step is too long for the motion, or the motion has passed a singular point.
     ///
-    /// Looked for at every recorded node, unless the model is linear, forced, damped, depends on time or has constraints; not across impulses.
+    /// Checked at every recorded node, except across impulses, and unless the model is linear, forced, damped, depends
+    /// on time or has constraints.
     EnergyJump {
         /// The node after the largest jump.
         time: f64,
@@ -59,16 +66,17 @@ pub enum Warning {
         /// How many such jumps there are.
         count: usize,
     },
-    /// Forces of the model have kinks or jumps, at which steps are not [cut](crate::Simulation::at_kinks): elements that cross one lose their order, and the estimate of the error
-    /// compares runs that cross it both.
+    /// Forces of the model have kinks or jumps, and steps do not [end](crate::Simulation::at_kinks) there. Elements
+    /// that cross one lose their order of accuracy, and so do both runs that the error estimate compares.
     ///
-    /// Told by runs with an estimate of their error.
+    /// Given by runs with an error estimate only.
     KinksCrossed,
-    /// An element and three of a third of its length (nine of a ninth where it was cut) end at different places, or the element after it when these are carried on: the step is too
-    /// long to resolve the motion (`docs/theory.md`, (T-121)).
+    /// The step is too long to resolve the motion: an element was solved again as three elements of a third of its
+    /// length (nine of a ninth if the element had been cut), and the two results differ, at its end or, continued, at
+    /// the end of the next element (`docs/theory.md`, (T-121)).
     ///
-    /// Looked for in the elements whose iteration did not contract quickly, by their numbers 0, 1, 2, 4, 8, … among these; not in linear models, nor with
-    /// [`Solve::Trusting`](crate::Solve::Trusting).
+    /// Checked in elements whose iteration did not contract quickly, the 0th, 1st, 2nd, 4th, 8th, … of these; not in
+    /// linear models, nor with [`Solve::Trusting`](crate::Solve::Trusting).
     Unresolved {
         /// Where the first such element begins.
         time: f64,
