@@ -1,4 +1,4 @@
-//! Boundary-value problems: elements over a span, assembled, with conditions at both ends.
+//! Two-point boundary-value problems: find the motion with given values at both ends of a span.
 
 mod problem;
 mod sensitive;

@@ -1,7 +1,8 @@
-//! Constrained models: consistent starts, reactions, and the motions that constraints allow.
+//! Constrained models: consistent initial conditions, reactions, and the motions that the constraints allow.
 //!
-//! A model with `constraint(name) = …` is run like any other; this module holds what is asked about it besides. Theory: `docs/theory.md`,
-//! constraints.
+//! A model with `constraint(name) = …` is simulated like any other. A constraint is either holonomic, φ(q, t) = 0, or
+//! linear in the velocities, A(q, t) v + a(q, t) = 0; for a holonomic one A = φ_q and a = φ_t. Theory:
+//! `docs/theory.md`, constraints.
 
 pub(crate) mod allowed;
 
@@ -12,33 +13,35 @@ use std::fmt;
 use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::{LegendreError, Model, State, StepError, legendre};
 
-/// A state on the constraints, and how far the values that were given lay from it.
+/// A consistent state, which satisfies all constraints, with its distance from the values given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Consistent<const N: usize> {
     /// The state.
     pub state: State<N>,
-    /// Its velocities.
+    /// The velocities of the state.
     pub velocities: [f64; N],
-    /// How far the coordinates moved: |q − q given|.
+    /// The distance by which the coordinates moved: |q − q given|, the Euclidean norm.
     pub position: f64,
-    /// How far the velocities moved: |v − v given|.
+    /// The distance by which the velocities moved: |v − v given|, the Euclidean norm.
     pub velocity: f64,
-    /// The number of independent constraints there.
+    /// The number of independent constraints at the state (the rank of the constraint Jacobian A).
     pub rank: usize,
 }
 
-/// Why there is no consistent state near the values that were given.
+/// Why no consistent state was found near the values given.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConsistentError {
-    /// Newton's method did not reach the constraints: they contradict one another, or the values are too far away.
+    /// Newton's method did not reach the constraints: they contradict each other, or the values given are too far
+    /// away.
     Unreached {
-        /// What is left, one entry for each constraint.
+        /// The violation that is left, one entry for each constraint.
         residuals: Vec<Residual>,
         /// Iterations done.
         iterations: u32,
     },
-    /// A value is not finite, or the model has no velocity (momentum) there.
+    /// A value is not finite, or the mass matrix is singular there, so that no momentum or velocity belongs to the
+    /// state.
     Model(StepError),
 }
 
@@ -93,23 +96,25 @@ pub(crate) fn write_residuals(f: &mut fmt::Formatter<'_>, residuals: &[Residual]
     Ok(())
 }
 
-/// What a run leaves of its constraints, over all recorded nodes; zeros for models without any.
+/// The largest violation of the constraints over all recorded nodes of a run; zeros for models without constraints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConstraintResidual {
-    /// max |φ| of the holonomic ones.
+    /// max |φ| over the holonomic constraints, in their own units.
     pub position: f64,
-    /// max |A v + a|
+    /// max |A v + a| over all constraints.
     pub velocity: f64,
-    /// The smallest number of independent constraints; of models of run-time length, which need all to be so, their number.
+    /// The smallest number of independent constraints at any node. For models of run-time length, whose constraints
+    /// must all be independent, this is the number of constraints.
     pub rank: usize,
 }
 
-/// The reactions λ of the constraints at the recorded nodes: the forces on the coordinates are Aᵀλ, with A = φ_q or the coefficients of the velocities.
+/// The reactions (Lagrange multipliers) λ of the constraints at the recorded nodes. The reaction forces on the
+/// coordinates are Aᵀλ, with A = φ_q for a holonomic constraint, and A the coefficients of the velocities for others.
 ///
-/// They are those of the instant, from the state alone (theory.md (T-77)), so that they have the accuracy of the state. Of dependent constraints any
-/// reactions with the same forces would do; these have the least Σ λ².
+/// They are computed from the state at each node alone (`docs/theory.md` (T-77)), so that they are as accurate as the
+/// state. If constraints are dependent, several λ give the same forces; the one with least Σ λ² is returned.
 ///
-/// Constraints of models of run-time length are called by their sites, `rod[0]`, `rod[1]`, …
+/// Constraints of models of run-time length are named by their sites: `rod[0]`, `rod[1]`, …
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reactions<Name = &'static str> {
     pub(crate) names: Vec<Name>,
@@ -122,7 +127,7 @@ impl<Name: fmt::Display> Reactions<Name> {
         &self.names
     }
 
-    /// The reactions of one constraint at the recorded nodes; `None` where the model declares no such name.
+    /// The reactions of one constraint at the recorded nodes; `None` if the model declares no constraint of this name.
     pub fn column(&self, name: &str) -> Option<Vec<f64>> {
         let is_it = |candidate: &Name| candidate.to_string() == name;
         let at = self.names.iter().position(is_it)?;
@@ -130,13 +135,15 @@ impl<Name: fmt::Display> Reactions<Name> {
         Some(rows.map(|row| row[at]).collect())
     }
 
-    /// All reactions at one recorded node; `None` beyond the last node, if there are constraints.
+    /// All reactions at one recorded node, in the order of [`names`](Self::names); `None` if there is no such node and
+    /// the model has constraints.
     pub fn row(&self, node: usize) -> Option<&[f64]> {
         row_of(&self.values, self.names.len(), node)
     }
 }
 
-/// Finds states that satisfy the constraints of a model.
+/// Finds consistent initial conditions: states that satisfy the constraints of a model, near given coordinates and
+/// velocities. Implemented for every model of fixed size.
 pub trait ConsistentState<const N: usize>: Model<N> + Sized {
     /// The consistent state nearest to (q, v) at t = 0; see [`consistent_state_at`](Self::consistent_state_at).
     ///
@@ -167,11 +174,13 @@ pub trait ConsistentState<const N: usize>: Model<N> + Sized {
 
     /// The consistent state nearest to (q, v) at the time t.
     ///
-    /// Coordinates move by the least |δq| to φ(q, t) = 0, velocities by the least kinetic energy, ½ δvᵀ L_vv δv, to A v + a = 0: as by a blow
-    /// of the reactions. Without constraints it is the state itself.
+    /// The coordinates move to the nearest point with φ(q, t) = 0, in the sense of least |δq|. The velocities then
+    /// change to satisfy A v + a = 0 with the least kinetic energy ½ δvᵀ L_vv δv of the change, as by an impulse of
+    /// the reactions. Without constraints, the state itself is returned.
     ///
     /// # Errors
-    /// [`ConsistentError`] if the constraints are not reached from there, or the model has no velocity there.
+    /// [`ConsistentError`] if the constraints are not reached from (q, v), or if a value is not finite or the mass
+    /// matrix is singular there.
     fn consistent_state_at(
         &self,
         t: f64,
@@ -284,16 +293,18 @@ fn step_to_constraints<M: Model<N>, const N: usize>(
     Some(tangent - inverse * phi)
 }
 
-/// An orthonormal basis of the motions (δp, δq) that the constraints allow at a state: 2N rows ordered (p, q), a column for each.
+/// An orthonormal basis of the variations (δp, δq) that the constraints allow at a state: a matrix of 2N rows, ordered
+/// (p, q), with one column for each basis vector.
 ///
 /// ```text
 /// A_V δq = 0 ,   ∂(A v + a)/∂q δq + A δv = 0 ,   δp = L_vq δq + L_vv δv             (theory.md (T-78))
 /// ```
 ///
-/// With h independent holonomic constraints and n others there are 2N − 2h − n of them. Without constraints it is the identity.
+/// With h independent holonomic constraints and n others there are 2N − 2h − n columns. Without constraints the result
+/// is the identity.
 ///
 /// # Errors
-/// [`StepError`] if the model has no velocity at the state.
+/// [`StepError`] if no velocity belongs to the momenta at the state.
 pub fn tangent_basis<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,

@@ -1,25 +1,34 @@
-//! Continuation of periodic orbits in one parameter: branches through folds, and the places where something happens on them.
+//! Continuation of periodic orbits in one parameter: follows a branch of orbits, also through folds, and locates its
+//! bifurcations.
 //!
-//! The unknowns are those of a periodic orbit ([`crate::periodic`]; `docs/theory.md`, (T-81)–(T-83), (T-91)) and the parameter λ,
+//! The unknowns are those of a periodic orbit ([`crate::periodic`]; `docs/theory.md`, (T-81)–(T-83), (T-91)) and the
+//! parameter λ. The equations are linearised to
 //!
 //! ```text
-//! δy_{e+1} − A_e δy_e − C_e δ(T, λ) = r_e ,     y_E = y_0 ,     ⟨τ, u − u_0⟩ = s      (and a condition of phase if T is unknown)
+//! δy_{e+1} − A_e δy_e − C_e δ(T, λ) = r_e ,     y_E = y_0 ,     ⟨τ, u − u_0⟩ = s      (and a phase condition if T is unknown)
 //! ```
 //!
-//! with u all unknowns, u_0 the last orbit, τ the unit tangent of the branch there and s the step in arc length: regular also where the
-//! branch turns back in λ. The predictor is u_0 + s τ, interiors of elements included; the corrector is Newton's method on the assembled elements.
-//! The next tangent comes from the same matrix with the right side (0, …, 0, 1), which also orients it. Arc length is measured in
-//! units of the parameter: ds² is dλ² plus w² times the mean square of the change of the orbit, each coordinate and momentum beside its own range, w the length of the range of the parameter.
+//! where u holds all unknowns, u_0 is the last orbit, τ the unit tangent of the branch there and s the step in arc
+//! length (pseudo-arclength continuation). These equations are regular also at a fold, where the branch turns back in
+//! λ.
+//!
+//! The predictor is u_0 + s τ, including the interior of the elements; the corrector is Newton's method on the
+//! assembled elements. The next tangent comes from the same matrix with the right-hand side (0, …, 0, 1), which also
+//! gives its direction. Arc length is measured in units of the parameter: ds² is dλ² plus w² times the mean square of
+//! the change of the orbit, where each coordinate and momentum is divided by its own range and w is the length of the
+//! range of the parameter.
 //!
 //! # Events
-//! Between two orbits a test function changes sign: dλ/ds at a fold, ∏ (μ + 1) at a period doubling, ∏ (μ_i μ_j − 1) where a pair goes
-//! through the unit circle, and the determinant of all equations where another branch crosses. Brent's method on the arc length, with the
-//! corrector at each trial, finds the place to round-off. Where another branch crosses the equations are singular, so the orbit there is that
-//! of a polynomial through solved orbits on both sides. The multipliers are those of [`crate::periodic_schur`].
+//! Bifurcations are located by test functions that change sign between two orbits: dλ/ds at a fold, ∏ (μ + 1) at a
+//! period doubling, ∏ (μ_i μ_j − 1) where a complex pair crosses the unit circle, and the determinant of all equations
+//! where another branch crosses. Brent's method on the arc length, with the corrector at each trial, finds the place
+//! up to rounding. Where another branch crosses, the equations are singular; the orbit there is interpolated from
+//! solved orbits on both sides. The multipliers μ are those of [`crate::periodic_schur`].
 //!
 //! # Not guaranteed
-//! Two events of one kind between two points are not seen, nor are collisions of multipliers on the unit circle away from ±1 (conservative
-//! models). Branches that fork off are not followed. A closed branch is run round until there are as many points as asked for.
+//! Two events of one kind between two neighbouring points of the branch are not seen, nor are collisions of
+//! multipliers on the unit circle away from ±1 (in conservative models). Branches that fork off are not followed. A
+//! closed branch is traced again and again until the largest number of points is reached.
 //!
 //! # Reference
 //! H. B. Keller, *Numerical solution of bifurcation and nonlinear eigenvalue problems*, in: P. Rabinowitz (ed.), *Applications of
@@ -48,8 +57,9 @@ use tfe_runtime::{Element, Model, State};
 
 /// A branch of periodic orbits to be followed in one parameter of its model.
 ///
-/// It begins at the model as given and goes towards the end of the range; through folds it may come back. It ends where it leaves the range,
-/// with a point exactly there, or where its orbits shrink to an equilibrium, [`End::Rest`].
+/// The branch begins at the orbit of the model as given, and goes towards the end of the range; at a fold it turns
+/// back. It ends where it leaves the range, with a point exactly there, or where its orbits shrink to an equilibrium,
+/// [`End::Rest`].
 ///
 /// - *Forced*: the [`period`](Self::period) is a function of the model.
 /// - *Autonomous with damping or forces*: the period is unknown ([`unknown_period`](Self::unknown_period)).
@@ -103,7 +113,7 @@ pub struct Continuation<'m, M, const N: usize> {
 }
 
 impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
-    /// A branch that begins at `model`, with the defaults.
+    /// A continuation that begins at the orbit of `model`, with the defaults.
     pub fn of(model: &'m M) -> Self {
         Self {
             model,
@@ -119,21 +129,22 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         }
     }
 
-    /// The field of the model that is the parameter: one of those of `sensitivity(…)`.
+    /// Sets which field of the model is the parameter λ: one of those named in `sensitivity(…)`.
     #[must_use]
     pub fn parameter(mut self, field: impl Fn(&mut M) -> &mut f64 + 'm) -> Self {
         self.field = Some(Box::new(field));
         self
     }
 
-    /// The range of the parameter, ascending or descending. The branch begins at the value that the model has and goes towards the end.
+    /// Sets the range of the parameter, ascending or descending. The branch begins at the value that the model has,
+    /// and goes towards the end of the range.
     #[must_use]
     pub fn range(mut self, range: Range<f64>) -> Self {
         self.range = Some(range);
         self
     }
 
-    /// The period, a function of the model: `|model| TAU / model.omega`.
+    /// Sets the period as a function of the model, for forced models: `|model| TAU / model.omega`.
     #[must_use]
     pub fn period(mut self, period: impl Fn(&M) -> f64 + 'm) -> Self {
         self.orbit = self.orbit.period(period(self.model));
@@ -141,7 +152,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         self
     }
 
-    /// The period is to be found; at the start, near `guess`.
+    /// Makes the period an unknown, for autonomous models; `guess` is its approximate value for the first orbit.
     #[must_use]
     pub fn unknown_period(mut self, guess: f64) -> Self {
         self.orbit = self.orbit.unknown_period(guess);
@@ -149,91 +160,95 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         self
     }
 
-    /// The element: `Mixed::<6>`, `Element::primal(n)`, …
+    /// Sets the element: `Mixed::<6>`, `Element::primal(n)`, …
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.orbit = self.orbit.element(element);
         self
     }
 
-    /// The number of elements, all equally long: of this and [`graded`](Self::graded) the last call counts.
+    /// Sets the number of elements in a period, all of the same length. Of this call and [`graded`](Self::graded) the
+    /// last one counts.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
         self.orbit = self.orbit.elements(elements);
         self
     }
 
-    /// One element a weight, each as long as its weight says beside the others, at every point.
+    /// Sets one element for each weight, with lengths proportional to the weights, for every orbit of the branch.
     #[must_use]
     pub fn graded(mut self, weights: impl IntoIterator<Item = f64>) -> Self {
         self.orbit = self.orbit.graded(weights);
         self
     }
 
-    /// The time at which the period begins; 0 by default.
+    /// Sets the time at which the period begins; 0 by default.
     #[must_use]
     pub fn start_time(mut self, time: f64) -> Self {
         self.orbit = self.orbit.start_time(time);
         self
     }
 
-    /// Where to look for the first orbit: a curve t ↦ (q, dq/dt).
+    /// Sets the first guess of the first orbit: a curve t ↦ (q, dq/dt).
     #[must_use]
     pub fn guess(mut self, curve: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
         self.orbit = self.orbit.guess(curve);
         self
     }
 
-    /// Where to look for the first orbit: the motion that starts here.
+    /// Sets the first guess of the first orbit: the motion that starts at this state.
     #[must_use]
     pub fn guess_from(mut self, state: State<N>) -> Self {
         self.orbit = self.orbit.guess_from(state);
         self
     }
 
-    /// Which of the orbits that differ in phase; for autonomous models.
+    /// Sets the phase condition, for autonomous models: which of the orbits that differ in their phase only.
     #[must_use]
     pub fn phase(mut self, phase: Phase) -> Self {
         self.orbit = self.orbit.phase(phase);
         self
     }
 
-    /// How much the coordinates grow over a period: a full turn for an angle that rotates.
+    /// Sets by how much the coordinates grow over a period: a full turn, for an angle that rotates.
     #[must_use]
     pub fn advance(mut self, advance: [f64; N]) -> Self {
         self.orbit = self.orbit.advance(advance);
         self
     }
 
-    /// When an orbit is found: the relative size of the last correction, 10⁻¹³ by default.
+    /// Sets when Newton's method has converged: when the last correction, relative to the orbit, is at most this;
+    /// 10⁻¹³ by default.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.orbit = self.orbit.tolerance(tolerance);
         self
     }
 
-    /// The first step of the parameter; a hundredth of the range by default. Later ones are adapted.
+    /// Sets the first step, in units of the parameter; a hundredth of the range by default. Later steps are adapted.
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
         self
     }
 
-    /// The smallest step in arc length, before the run is given up: a millionth of the range by default.
+    /// Sets the smallest step in arc length; a millionth of the range by default. If the corrector fails even with it,
+    /// the run ends with an error.
     #[must_use]
     pub fn smallest_step(mut self, step: f64) -> Self {
         self.smallest = Some(step);
         self
     }
 
-    /// The largest step in arc length: how far apart points are at most. A twentieth of the range by default, or the first step where that is longer.
+    /// Sets the largest step in arc length, the largest distance of neighbouring points. By default a twentieth of the
+    /// range, or the first step if that is longer.
     #[must_use]
     pub fn largest_step(mut self, step: f64) -> Self {
         self.largest = Some(step);
         self
     }
 
-    /// The most points, 1000 by default.
+    /// Sets the largest number of points, 1000 by default.
     #[must_use]
     pub fn max_points(mut self, points: usize) -> Self {
         self.max_points = points;
@@ -247,10 +262,10 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         self
     }
 
-    /// Follows the branch.
+    /// Follows the branch and locates its bifurcations.
     ///
     /// # Errors
-    /// [`ContinuationError`] says why and holds the branch so far.
+    /// [`ContinuationError`] says why the continuation failed, and holds the branch up to there.
     pub fn run(&self) -> Result<Branch<M, N>, ContinuationError<M, N>> {
         let mut branch = Branch::new("");
         match self.follow(&mut branch) {

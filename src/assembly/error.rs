@@ -3,13 +3,13 @@
 use std::fmt;
 use tfe_runtime::{ElementError, LegendreError, StepError};
 
-/// Why an assembled problem has no solution.
+/// Why the assembled equations of a boundary-value problem, periodic orbit or similar have no solution.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AssemblyError {
     /// The time element does not exist.
     Element(ElementError),
-    /// An element could not be linearised.
+    /// The equations of an element could not be linearised.
     Linearise {
         /// The number of the element, from 0.
         element: usize,
@@ -18,10 +18,11 @@ pub enum AssemblyError {
         /// Why.
         source: StepError,
     },
-    /// A velocity or a momentum at a node could not be found.
+    /// A velocity or a momentum at a node could not be found (Legendre transform).
     Legendre(LegendreError),
-    /// The solution violates a constraint at a node. Of constraints that depend on one another elements keep only as many as are independent: here they contradict, or the
-    /// position is singular; or coordinates that are asked for at the ends are not on the constraints.
+    /// The solution violates a constraint at a node. Elements keep only as many constraints as are independent, so
+    /// this happens if constraints contradict each other, if the position is singular, or if the coordinates asked for
+    /// at the ends violate the constraints.
     Violated {
         /// The constraint.
         constraint: &'static str,
@@ -32,12 +33,13 @@ pub enum AssemblyError {
         /// By how much: |φ| or |A v + a| over the length of its row, relative to the largest position or velocity of the solution.
         residual: f64,
     },
-    /// The equations of the chain are singular: there is no solution, or there are many near each other.
+    /// The assembled equations are singular: there is no solution, or there are many close to each other (for example
+    /// a family of periodic orbits, or ends that are conjugate points).
     Singular {
         /// Iterations done.
         iterations: u32,
     },
-    /// Newton's method came to no end.
+    /// Newton's method did not converge.
     Stalled {
         /// Iterations done.
         iterations: u32,

@@ -142,13 +142,13 @@ impl Mesh {
     }
 }
 
-/// Why a mesh is none.
+/// Why a mesh of elements is invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MeshError {
-    /// There is not a single element.
+    /// The number of elements is zero.
     NoElements,
-    /// A weight of a graded mesh is not positive, or the weights have no finite sum.
+    /// A weight of a graded mesh is not positive, or the sum of the weights is not finite.
     Weight {
         /// Which element.
         element: usize,

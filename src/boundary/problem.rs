@@ -13,12 +13,12 @@ use std::ops::Range;
 use tfe_runtime::condenser::Direction;
 use tfe_runtime::{Element, LegendreError, Mixed, Model, State, Statistics};
 
-/// A component of the state at one end.
+/// A component of the state at one end of the span.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
-    /// The coordinate with this index.
+    /// The coordinate qᵢ with this index, from 0.
     Coordinate(usize),
-    /// The momentum with this index.
+    /// The momentum pᵢ with this index, from 0.
     Momentum(usize),
 }
 
@@ -102,17 +102,23 @@ pub(crate) fn straight<const N: usize>(
     move |t| (line.map(|(q, v)| q + v * (t - start)), line.map(|(_, v)| v))
 }
 
-/// A motion with given values at both ends of a span, to be found: 2N conditions in all, coordinates and momenta mixed at will.
+/// A two-point boundary-value problem: the motion of a model over a span with 2N values of coordinates and momenta
+/// given at its ends, in any combination.
+///
+/// All elements of the span are assembled and solved together by Newton's method; the linear equations of an iteration
+/// are
 ///
 /// ```text
 /// δy_{e+1} − A_e δy_e = r_e ,   e = 0 … E − 1 ;      B₀ y_0 + B_E y_E = b
 /// ```
 ///
-/// (`docs/theory.md`, (T-81) with other ends.) All conditions at the start make it the initial-value problem, assembled over the whole
-/// span: the same motion as stepping.
+/// (`docs/theory.md`, (T-81) with other conditions at the ends), with A_e the transition matrix of element e and B₀,
+/// B_E the rows of the conditions. With all conditions at the start, this is the initial-value problem solved for the
+/// whole span at once: the same motion as step by step.
 ///
-/// Defaults: `Mixed::<4>` (order 6), 40 equal elements, and as first guess a straight line between the coordinates that are given
-/// (steps of second order where all is given at the start).
+/// Defaults: element `Mixed::<4>` (order 6), 40 equal elements. The first guess is a straight line between the
+/// coordinates given (or, if everything is given at the start, a motion by steps of second order). If several motions
+/// meet the conditions, the guess decides which one is found.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -145,7 +151,7 @@ pub struct BoundaryValue<'m, M, const N: usize> {
 }
 
 impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
-    /// A problem for `model`, without conditions so far.
+    /// A problem for `model`, as yet without conditions.
     pub fn of(model: &'m M) -> Self {
         Self {
             model,
@@ -159,14 +165,15 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         }
     }
 
-    /// The element.
+    /// Sets the element; `Mixed::<4>` by default.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = element.into();
         self
     }
 
-    /// The number of elements, all equally long: of this and [`graded`](Self::graded) the last call counts.
+    /// Sets the number of elements, all of the same length; 40 by default. Of this call and [`graded`](Self::graded)
+    /// the last one counts.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
         self.elements = elements;
@@ -174,7 +181,8 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         self
     }
 
-    /// One element a weight, each as long as its weight says beside the others.
+    /// Sets one element for each weight, with lengths proportional to the weights: short elements where the motion is
+    /// fast.
     #[must_use]
     pub fn graded(mut self, weights: impl IntoIterator<Item = f64>) -> Self {
         self.weights = weights.into_iter().collect();
@@ -182,14 +190,14 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         self
     }
 
-    /// From when to when.
+    /// Sets the span of time.
     #[must_use]
     pub fn span(mut self, span: Range<f64>) -> Self {
         self.span = span;
         self
     }
 
-    /// All coordinates at both ends.
+    /// Sets all coordinates at both ends, and the span.
     #[must_use]
     pub fn from_to(mut self, start: [f64; N], end: [f64; N], span: Range<f64>) -> Self {
         for (a, (start, end)) in start.into_iter().zip(end).enumerate() {
@@ -200,7 +208,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         self.span(span)
     }
 
-    /// All conditions at the start: the initial-value problem, as one assembled system.
+    /// Sets all components at the start, and the span: the initial-value problem, solved for the whole span at once.
     #[must_use]
     pub fn initial(mut self, state: State<N>, span: Range<f64>) -> Self {
         for a in 0..N {
@@ -211,7 +219,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         self.span(span)
     }
 
-    /// Gives one component at the start.
+    /// Sets one component at the start.
     #[must_use]
     pub fn start(mut self, component: Component, value: f64) -> Self {
         self.conditions.push(Condition {
@@ -222,7 +230,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         self
     }
 
-    /// Gives one component at the end.
+    /// Sets one component at the end.
     #[must_use]
     pub fn end(mut self, component: Component, value: f64) -> Self {
         self.conditions.push(Condition {
@@ -233,37 +241,42 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         self
     }
 
-    /// Where to begin: a curve t ↦ (q, dq/dt). Where a problem has several solutions it decides which one is found.
+    /// Sets the first guess of Newton's method: a curve t ↦ (q, dq/dt). If the problem has several solutions, it
+    /// decides which one is found.
     #[must_use]
     pub fn guess(mut self, curve: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
         self.guess = Some(Box::new(curve));
         self
     }
 
-    /// When the iteration is done: the relative size of the last correction, 10⁻¹³ by default. The correction that meets it is applied.
+    /// Sets when the iteration is finished: when the last correction, relative to the solution, is at most this; 10⁻¹³
+    /// by default. That correction is still applied.
     ///
-    /// Coordinates are measured by the largest of them, and so are momenta. Those that are much smaller, as an angle beside a distance, are corrected further for as long as that makes
-    /// them better, by at most six iterations.
+    /// Coordinates are measured relative to the largest coordinate, momenta relative to the largest momentum.
+    /// Components that are much smaller, such as an angle beside a distance, are corrected by up to six more
+    /// iterations for as long as these improve them.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
         self
     }
 
-    /// The most iterations of Newton's method, 50 by default.
+    /// Sets the largest number of iterations of Newton's method, 50 by default.
     #[must_use]
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.control.max_iterations = iterations;
         self
     }
 
-    /// Finds the motion.
+    /// Solves the problem.
     ///
-    /// Between conjugate points, as of an oscillator after half a period, all coordinates at both ends have no solution, or a whole family. Elements are off by a little, and have one that
-    /// is as large as that is small: what elements of half the length do not leave as it is, is [`AssemblyError::Singular`].
+    /// Between conjugate points (for an oscillator, after half a period), the problem with all coordinates given at
+    /// both ends has no solution or a whole family of them. The discretised equations still have a solution, which is
+    /// determined by the discretisation error alone. Such a solution changes when the elements are halved, and is
+    /// reported as [`AssemblyError::Singular`].
     ///
     /// # Errors
-    /// [`BoundaryError`]: the conditions make no sense, or there is no solution near the guess.
+    /// [`BoundaryError`] if the conditions or the mesh are invalid, or if no solution is found from the guess.
     pub fn solve(&self) -> Result<BoundaryMotion<'m, M, N>, BoundaryError> {
         self.check()?;
         let mut problem = self.problem()?;
@@ -415,51 +428,51 @@ impl<M: Model<N>, const N: usize> BoundaryMotion<'_, M, N> {
         self.solution.start()
     }
 
-    /// The state at its end.
+    /// The state at the end of the span.
     pub fn end(&self) -> State<N> {
         self.solution.end()
     }
 
-    /// The ends of the elements, in order.
+    /// The nodes (ends of the elements), in order of time.
     pub fn nodes(&self) -> Vec<Node<N>> {
         self.solution.nodes()
     }
 
-    /// The transition matrices of the elements in order, 2N × 2N, ordered (p, q).
+    /// The transition matrices of the elements, in order: 2N × 2N each, ordered (p, q).
     pub fn transitions(&self) -> Vec<DMatrix<f64>> {
         self.solution.matrices()
     }
 
-    /// What the solution cost.
+    /// Counts of iterations, evaluations and factorisations of the solution.
     pub fn statistics(&self) -> &Statistics {
         &self.solution.statistics
     }
 
-    /// The motion, with dense output.
+    /// The solution as a motion with dense output.
     pub fn motion(&self) -> Motion<N> {
         self.solution.motion()
     }
 }
 
-/// Why a boundary-value problem has no solution.
+/// Why a boundary-value problem was not solved.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BoundaryError {
-    /// The span was not given, is empty, or not finite.
+    /// The span was not given, is empty, or is not finite.
     Span {
         /// Its start.
         start: f64,
         /// Its end.
         end: f64,
     },
-    /// There must be 2N conditions.
+    /// The number of conditions is not 2N.
     Count {
         /// So many are needed.
         needed: usize,
         /// So many were given.
         given: usize,
     },
-    /// A component does not exist.
+    /// A component does not exist: its index is not below N.
     Component {
         /// Which.
         component: Component,
@@ -469,16 +482,16 @@ pub enum BoundaryError {
         /// Which.
         component: Component,
     },
-    /// A value is not finite.
+    /// A given value is not finite.
     Value {
         /// Of which component.
         component: Component,
         /// Its value.
         value: f64,
     },
-    /// The mesh makes no sense.
+    /// The mesh is invalid.
     Mesh(MeshError),
-    /// The assembled equations were not solved.
+    /// The assembled equations could not be solved.
     Assembly(AssemblyError),
 }
 

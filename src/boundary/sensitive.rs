@@ -6,9 +6,10 @@ use crate::sensitivity::names::place_of;
 use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
-    /// Finds the motion as [`solve`](Self::solve) does, and how it changes with each parameter of the model and with each value at its ends.
+    /// Solves the problem as [`solve`](Self::solve) does, and computes the derivatives of the solution with respect to
+    /// each parameter of the model and each value given at the ends.
     ///
-    /// The derivatives are exact for the elements (`docs/theory.md`, (T-156)).
+    /// They are the derivatives of the discrete solution, exact up to rounding (`docs/theory.md`, (T-156)).
     ///
     /// ```
     /// use tfe::boundary::Component::Coordinate;
@@ -31,7 +32,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     /// ```
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// As from [`solve`](Self::solve).
     pub fn solve_sensitive(&self) -> Result<SensitiveBoundaryMotion<'m, M, N>, BoundaryError> {
         let solved = self.solve()?;
         let indices: Vec<usize> = (0..self.model.parameters()).collect();
@@ -55,7 +56,8 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     }
 }
 
-/// A solution with its derivatives by the parameters of its model and by the values at its ends; made by [`BoundaryValue::solve_sensitive`].
+/// A solution with its derivatives with respect to the parameters of the model and the values at the ends; made by
+/// [`BoundaryValue::solve_sensitive`].
 #[derive(Clone, Debug)]
 pub struct SensitiveBoundaryMotion<'m, M, const N: usize> {
     solved: BoundaryMotion<'m, M, N>,
@@ -71,32 +73,32 @@ impl<'m, M, const N: usize> SensitiveBoundaryMotion<'m, M, N> {
         &self.solved
     }
 
-    /// The names of the parameters, `m` or `k[2]`, in the order of the struct.
+    /// The names of the parameters, `m` or `k[2]`, in the order of the fields of the struct.
     pub fn parameters(&self) -> &[String] {
         &self.parameters
     }
 
-    /// The derivatives of coordinates and momenta by a parameter, at the nodes in order.
+    /// The derivatives ∂q/∂θ and ∂p/∂θ with respect to the parameter θ of this name, at the nodes in order.
     ///
     /// # Panics
-    /// Where no parameter has this name, as an index out of bounds does; [`get`](Self::get) does not.
+    /// If no parameter has this name; [`get`](Self::get) returns `None` instead.
     #[track_caller]
     pub fn by(&self, name: &str) -> &[State<N>] {
         &self.by_parameters[place_of(name, &self.parameters)]
     }
 
-    /// The derivatives by a parameter; `None` where none has this name.
+    /// The derivatives with respect to a parameter; `None` if no parameter has this name.
     pub fn get(&self, name: &str) -> Option<&[State<N>]> {
         let place = self.parameters.iter().position(|own| own == name)?;
         self.by_parameters.get(place).map(Vec::as_slice)
     }
 
-    /// The derivatives by what a component has at the start; `None` where that was not given.
+    /// The derivatives with respect to the value given for a component at the start; `None` if none was given.
     pub fn by_start(&self, component: Component) -> Option<&[State<N>]> {
         self.by_condition(false, component)
     }
 
-    /// The derivatives by what a component has at the end; `None` where that was not given.
+    /// The derivatives with respect to the value given for a component at the end; `None` if none was given.
     pub fn by_end(&self, component: Component) -> Option<&[State<N>]> {
         self.by_condition(true, component)
     }

@@ -11,38 +11,40 @@ use std::io;
 use std::path::Path;
 use tfe_runtime::{Element, Model, State, Statistics};
 
-/// An orbit of a branch, in numbers.
+/// One periodic orbit of a branch: its parameter, period, amplitudes and Floquet multipliers.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Point<const N: usize> {
-    /// The parameter.
+    /// The parameter λ.
     pub parameter: f64,
     /// The period T.
     pub period: f64,
     /// The state at the start of the period.
     pub start: State<N>,
-    /// Half the distance between the largest and the smallest value of each coordinate over the period, less what it grows in all.
+    /// The amplitude of each coordinate: half the difference of its largest and its smallest value over the period,
+    /// without its growth over the whole period.
     ///
-    /// From nodes, three places inside each element, and a parabola through the largest three: six digits with a few dozen elements.
+    /// It is found from the nodes, three points inside each element, and a parabola through the largest three values;
+    /// this gives six digits with a few dozen elements.
     pub amplitudes: [f64; N],
-    /// The Floquet multipliers, the largest modulus first.
+    /// The Floquet multipliers, in order of decreasing modulus.
     pub multipliers: Vec<Complex<f64>>,
-    /// The same as logarithms of the modulus and arguments.
+    /// The Floquet multipliers as logarithms of the modulus and arguments, which neither overflow nor underflow.
     pub floquet: Vec<Multiplier>,
-    /// The places of those that are always one, see [`Orbit::trivial`].
+    /// The indices of the trivial multipliers, which are always one; see [`Orbit::trivial`].
     pub trivial: Vec<usize>,
-    /// Stability, from the others.
+    /// The stability of the orbit, from the other multipliers.
     pub verdict: Verdict,
-    /// The direction of the branch.
+    /// The direction of the branch at this orbit.
     pub tangent: Tangent<N>,
-    /// Iterations of Newton's method that the orbit took.
+    /// The number of iterations of Newton's method for this orbit.
     pub iterations: u32,
 }
 
-/// How an orbit changes along its branch, a unit of arc length s.
+/// The derivatives of an orbit along its branch, with respect to the arc length s.
 ///
-/// Off folds the derivatives by the parameter are the others divided by the first. For an autonomous model those of the start depend on the
-/// condition of phase.
+/// Away from folds, the derivatives with respect to the parameter are the other derivatives divided by dλ/ds. For an
+/// autonomous model, the derivative of the start depends on the phase condition.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tangent<const N: usize> {
     /// dλ/ds.
@@ -54,36 +56,38 @@ pub struct Tangent<const N: usize> {
 }
 
 impl<const N: usize> Point<N> {
-    /// Whether neighbours stay near: the verdict is not unstable.
+    /// Whether the orbit is not unstable, so that neighbouring motions stay near.
     pub fn is_stable(&self) -> bool {
         !matches!(self.verdict, Verdict::Unstable { .. })
     }
 }
 
-/// A place where the branch turns, or where other orbits begin.
+/// A bifurcation: a place where the branch turns, or where other orbits begin.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Event<const N: usize> {
-    /// What happens.
+    /// The kind of the bifurcation.
     pub kind: EventKind,
-    /// The orbit there.
+    /// The orbit at the bifurcation.
     pub point: Point<N>,
-    /// The event lies between this place of [`Branch::points`] and the next, or at this place itself.
+    /// The index of the point in [`Branch::points`] at which, or between which and the next point, the event lies.
     pub after: usize,
-    /// How far the parameter is known: the size of the last interval in which the sign of the test function changed. Where another branch
-    /// crosses, the equations are singular; the orbit there is interpolated, and this is the difference of two interpolations.
+    /// How accurately the parameter of the event is known: the length of the last interval in which the test function
+    /// changed its sign. Where another branch crosses, the orbit is interpolated, and this is the difference of two
+    /// interpolations.
     pub width: f64,
 }
 
 /// How a branch ended without an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// At an end of the range; the last point lies exactly on it.
+    /// At an end of the range; the last point is exactly there.
     Range,
-    /// After as many points as were asked for.
+    /// After the largest number of points.
     Points,
-    /// Where the orbits of an autonomous model shrink to an equilibrium (Hopf). The parameter of the last point is that of the equilibrium up to the order of the square of the
-    /// [smallest step](super::Continuation::smallest_step), beside the range.
+    /// At a Hopf bifurcation, where the orbits of an autonomous model shrink to an equilibrium. The parameter of the
+    /// last point is that of the equilibrium, with an error of the order of the square of the [smallest
+    /// step](super::Continuation::smallest_step) relative to the range.
     Rest,
 }
 
@@ -141,7 +145,7 @@ impl<const N: usize> Frame<N> {
 
 /// A branch of periodic orbits in one parameter, made by [`Continuation`](super::Continuation).
 ///
-/// It holds a clone of the model at each of its points.
+/// It holds a clone of the model for each of its points.
 #[derive(Clone)]
 pub struct Branch<M, const N: usize> {
     pub(super) parameter: &'static str,
@@ -174,7 +178,7 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
         &self.points
     }
 
-    /// Folds, period doublings, tori and other branches, in order along the branch.
+    /// The bifurcations (folds, period doublings, tori, branch points), in order along the branch.
     pub fn events(&self) -> &[Event<N>] {
         &self.events
     }
@@ -184,7 +188,7 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
         self.events.iter().filter(move |event| event.kind == kind)
     }
 
-    /// How the branch ended; `None` where an error cut it short.
+    /// How the branch ended; `None` if an error ended it.
     pub fn end(&self) -> Option<End> {
         self.end
     }
@@ -194,7 +198,7 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
         self.parameter
     }
 
-    /// The orbit at a point, with its motion and its matrices; `None` beyond the last.
+    /// The orbit at a point, with its motion and its transition matrices; `None` if there is no such point.
     pub fn orbit(&self, point: usize) -> Option<Orbit<'_, M, N>> {
         let (frame, point, member) = (
             self.frame.as_ref()?,
@@ -204,7 +208,7 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
         Some(frame.orbit(member, point.floquet.clone(), point.iterations))
     }
 
-    /// The orbit at an event.
+    /// The orbit at an event; `None` if there is no such event.
     pub fn event_orbit(&self, event: usize) -> Option<Orbit<'_, M, N>> {
         let (frame, event, member) = (
             self.frame.as_ref()?,
@@ -215,25 +219,27 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
         Some(frame.orbit(member, point.floquet.clone(), point.iterations))
     }
 
-    /// The model at a point.
+    /// The model with the parameter of a point; `None` if there is no such point.
     pub fn model(&self, point: usize) -> Option<&M> {
         self.members.get(point).map(|member| &member.model)
     }
 
-    /// The model at an event.
+    /// The model with the parameter of an event; `None` if there is no such event.
     pub fn event_model(&self, event: usize) -> Option<&M> {
         self.event_members.get(event).map(|member| &member.model)
     }
 
-    /// What the branch cost, with its events.
+    /// Counts of iterations, evaluations and factorisations of the whole branch, including its events.
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
     }
 
-    /// Writes the points as CSV with a header line: parameter, period, amplitudes, multipliers (real and imaginary parts), and 1 where stable,
-    /// else 0. Numbers read back exactly. A parameter called `period` keeps its name, and the period is `period_`.
+    /// Writes the points as CSV with a header line: parameter, period, amplitudes, multipliers (real and imaginary
+    /// parts), and 1 if the orbit is stable, else 0. Numbers read back exactly. If the parameter is called `period`,
+    /// it keeps its name and the period is the column `period_`.
     ///
     /// # Errors
+    /// Those of the file system.
     /// Those of the file system.
     pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
         let mut names = vec!["period".to_owned()];

@@ -6,20 +6,20 @@ use std::error::Error;
 use std::fmt;
 use tfe_runtime::Model;
 
-/// Why continuation stopped.
+/// Why a continuation failed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ContinuationErrorKind {
-    /// No parameter was chosen.
+    /// No parameter was chosen: call `parameter`.
     NoParameter,
-    /// The model has no derivative by the parameter.
+    /// The model has no derivative with respect to the parameter: it is not named in `sensitivity(…)`.
     NoSensitivity {
         /// Those by which it has.
         known: &'static [&'static str],
     },
-    /// No range was given.
+    /// No range of the parameter was given: call `range`.
     NoRange,
-    /// The range is not finite or does not hold the value that the model has, before its end.
+    /// The range is not finite, or the value that the model has does not lie in it, before its end.
     Range {
         /// Its start.
         start: f64,
@@ -28,7 +28,7 @@ pub enum ContinuationErrorKind {
         /// The value of the model.
         value: f64,
     },
-    /// The steps are not positive and finite, or the first is not between the smallest and the largest.
+    /// The step sizes are not positive and finite, or the first is not between the smallest and the largest.
     Steps {
         /// The first step.
         step: f64,
@@ -37,9 +37,9 @@ pub enum ContinuationErrorKind {
         /// The largest one.
         largest: f64,
     },
-    /// There is no orbit at the start.
+    /// The first orbit was not found.
     Start(OrbitError),
-    /// The smallest step was still too long.
+    /// The corrector failed even with the smallest step.
     Step {
         /// The parameter of the last orbit.
         parameter: f64,
@@ -113,7 +113,7 @@ impl Error for ContinuationErrorKind {
     }
 }
 
-/// A branch that stopped before its end: why, and the branch so far.
+/// A continuation that failed: why, and the branch up to there.
 #[derive(Clone)]
 pub struct ContinuationError<M, const N: usize> {
     kind: Box<ContinuationErrorKind>,
@@ -128,17 +128,17 @@ impl<M: Model<N>, const N: usize> ContinuationError<M, N> {
         }
     }
 
-    /// Why it stopped.
+    /// Why the continuation failed.
     pub fn kind(&self) -> &ContinuationErrorKind {
         &self.kind
     }
 
-    /// The branch so far; without points where it never began.
+    /// The branch up to the failure; without points if no first orbit was found.
     pub fn partial(&self) -> &Branch<M, N> {
         &self.partial
     }
 
-    /// The branch so far, by value.
+    /// The branch up to the failure, by value.
     pub fn into_partial(self) -> Branch<M, N> {
         *self.partial
     }

@@ -3,17 +3,20 @@
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
 
-/// What happens at a place of a branch.
+/// The kind of a bifurcation on a branch of periodic orbits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum EventKind {
-    /// The branch turns back in the parameter; a multiplier goes through +1.
+    /// A fold (saddle-node): the branch turns back in the parameter, and a multiplier passes through +1.
     Fold,
-    /// A real multiplier goes through −1: a branch of orbits of twice the period begins.
+    /// A period doubling (flip): a real multiplier passes through −1, and a branch of orbits of twice the period
+    /// begins.
     PeriodDoubling,
-    /// A complex pair goes through the unit circle: an invariant torus begins (Neimark and Sacker).
+    /// A torus (Neimark–Sacker) bifurcation: a complex pair of multipliers crosses the unit circle, and an invariant
+    /// torus begins.
     Torus,
-    /// A real multiplier goes through +1 and the branch does not turn: another branch of the same period crosses or forks off.
+    /// A branch point: a real multiplier passes through +1 and the branch does not turn; another branch of the same
+    /// period crosses or forks off.
     Branch,
 }
 
