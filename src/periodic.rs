@@ -1,13 +1,16 @@
-//! Periodic orbits: elements over one period, assembled and closed, and the Floquet multipliers of the solution.
+//! Periodic orbits and their Floquet multipliers: find a motion that repeats after a period T.
+//!
+//! The elements over one period are assembled and solved together, closed by periodicity; Newton's method solves
 //!
 //! ```text
-//! δy_{e+1} − A_e δy_e − C_e δT = r_e ,   e = 0 … E − 1 ;      y_E = y_0 ;      one condition of phase if T is unknown
+//! δy_{e+1} − A_e δy_e − C_e δT = r_e ,   e = 0 … E − 1 ;      y_E = y_0 ;      one phase condition if T is unknown
 //! ```
 //!
-//! (`docs/theory.md`, (T-81)–(T-83)). The system is solved by structured orthogonal elimination: its cost is linear in the number E of
-//! elements, and growing and decaying directions do not disturb each other. The multipliers are the eigenvalues of A_E ⋯ A_1; they come from
-//! a periodic Schur decomposition of the matrices of the elements ([`crate::periodic_schur`]), never from the product, so that a multiplier of
-//! 10⁻¹² keeps its digits beside one of 10¹².
+//! (`docs/theory.md`, (T-81)–(T-83)) with A_e the transition matrix of element e. The system is solved by structured
+//! orthogonal elimination: the cost is linear in the number E of elements, and neither growing nor decaying directions
+//! spoil the result. The Floquet multipliers are the eigenvalues of the monodromy matrix A_E ⋯ A_1. They come from a
+//! periodic Schur decomposition of the matrices of the elements ([`crate::periodic_schur`]), never from the product,
+//! so that a multiplier of 10⁻¹² keeps its digits beside one of 10¹².
 
 mod error;
 #[cfg(feature = "sparse")]

@@ -6,9 +6,9 @@
 //! P = A_m ··· A_2 A_1 ,
 //! ```
 //!
-//! and its eigenvalues are the Floquet multipliers. Where some grow and others decay, the product as a floating-point
-//! matrix keeps the growing ones only: a multiplier of 1e-20 beside one of 1e+20 is lost in the round-off of the
-//! larger, and a long product over- or underflows. The periodic Schur decomposition works on the factors instead. It
+//! and its eigenvalues are the Floquet multipliers. If some of these are large and others small, the explicit product
+//! keeps only the large ones: a multiplier of 1e-20 beside one of 1e+20 is lost in the rounding error of the larger
+//! one, and a long product overflows or underflows. The periodic Schur decomposition works on the factors instead. It
 //! finds orthogonal matrices Q₁, …, Q_m, with Q_{m+1} = Q₁, such that
 //!
 //! ```text
@@ -59,7 +59,7 @@ use std::f64::consts::PI;
 
 /// An eigenvalue of a product, as modulus and argument.
 ///
-/// The modulus is kept as its natural logarithm, so that e^±1000 is as good as 1.
+/// The modulus is stored as its natural logarithm, so that e^±1000 is represented as well as 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Multiplier {
     /// The natural logarithm of the modulus; −∞ for the eigenvalue zero.
@@ -69,7 +69,7 @@ pub struct Multiplier {
 }
 
 impl Multiplier {
-    /// The modulus: infinite or zero where it is too large or too small for an `f64`.
+    /// The modulus |μ|; infinite or zero if it is too large or too small for an `f64`.
     ///
     /// The exponential function costs a relative error of |`log_modulus`| ε.
     pub fn modulus(&self) -> f64 {
@@ -78,7 +78,7 @@ impl Multiplier {
 
     /// The eigenvalue as a complex number; its imaginary part is exactly zero if the eigenvalue is real.
     ///
-    /// Parts are infinite where [`modulus`](Self::modulus) is.
+    /// The parts are infinite if [`modulus`](Self::modulus) is.
     pub fn to_complex(&self) -> Complex<f64> {
         let modulus = self.modulus();
         if self.argument == 0.0 {
@@ -112,12 +112,12 @@ impl Multiplier {
 /// modulus; complex pairs are adjacent and exact conjugates, positive argument first. Among eigenvalues whose moduli
 /// agree to round-off the order is not guaranteed, and a double real eigenvalue may come as a complex pair or as two
 /// real eigenvalues, each within its conditioning. A factor that is singular to round-off gives the eigenvalue zero,
-/// `log_modulus` = −∞, as far as round-off allows to tell: a second zero may come as round-off of the largest. Factors
-/// of size 0 × 0 give the empty list.
+/// `log_modulus` = −∞, as far as rounding allows to decide: a second zero may come out as a rounding error of the
+/// largest eigenvalue. Factors of size 0 × 0 give the empty list.
 ///
 /// # Errors
-/// [`PeriodicSchurError`] for an empty list, for sizes that do not fit, for entries that are not finite, and if the
-/// iteration does not converge: this has been seen only where entries of one factor span the whole range of an `f64`.
+/// [`PeriodicSchurError`] for an empty list, for sizes that do not match, for entries that are not finite, and if the
+/// iteration does not converge, which has been seen only if the entries of one factor span the whole range of `f64`.
 ///
 /// # Example
 /// A product whose explicit form loses its small eigenvalue:
@@ -138,7 +138,7 @@ pub fn multipliers(factors: &[DMatrix<f64>]) -> Result<Vec<Multiplier>, Periodic
     eigenvalues_of_product(factors.to_vec())
 }
 
-/// As [`multipliers`], of factors of `order` rows in one slice, one after the other and each row by row.
+/// As [`multipliers`], for factors of `order` rows stored in one slice, one factor after the other, each row by row.
 ///
 /// # Errors
 /// As [`multipliers`]; [`PeriodicSchurError::Length`] if the slice does not hold a whole number of factors.

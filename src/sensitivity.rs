@@ -18,18 +18,22 @@ use std::fmt;
 pub use hessian::LossHessian;
 pub use loss::{Loss, LossGradient};
 
-/// A motion together with its derivatives by the parameters of its model and by its start, from [`Simulation::run_sensitive`](crate::Simulation::run_sensitive).
+/// A motion together with its derivatives with respect to the parameters of its model and to its start (forward
+/// sensitivities), from [`Simulation::run_sensitive`](crate::Simulation::run_sensitive).
 ///
-/// With y = (p, q), A_e the derivative of the step over element e by its start and C_e by the parameters a,
+/// With y = (p, q), A_e the derivative of the end of element e with respect to its start, and C_e that with respect to
+/// the parameters a,
 ///
 /// ```text
 /// ∂y_{e+1}/∂a = A_e ∂y_e/∂a + C_e ,      ∂y_{e+1}/∂y₀ = A_e ∂y_e/∂y₀                              (T-123)
 /// ```
 ///
-/// They are derivatives of the numbers that the run computes, by implicit differentiation of its elements, not approximations of a differential equation. Where an
-/// [event](crate::Simulation::on) cuts an element, its time moves with parameters and start, and what is done there is differentiated too (T-124).
+/// These are derivatives of the computed motion, by implicit differentiation of its elements, and exact up to
+/// rounding. If an [event](crate::Simulation::on) cuts an element, the derivatives include the change of the event's
+/// time, and that of what is done there (T-124).
 ///
-/// The start is the state (q, p): by a parameter it stays as it is, also where it was made of velocities, whose momenta depend on the parameter.
+/// The start is the state (q, p), which does not depend on parameters, even if it was made from velocities: those
+/// momenta would change with a mass.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -107,15 +111,15 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         &self.motion
     }
 
-    /// The names of the parameters, `m` or `k[2]`, in the order of the struct.
+    /// The names of the parameters, `m` or `k[2]`, in the order of the fields of the struct.
     pub fn parameters(&self) -> &[String] {
         &self.parameters
     }
 
-    /// The derivatives by a parameter.
+    /// The derivatives with respect to the parameter of this name.
     ///
     /// # Panics
-    /// Where no parameter has this name, as an index out of bounds does; [`get`](Self::get) does not.
+    /// If no parameter has this name; [`get`](Self::get) returns `None` instead.
     #[track_caller]
     pub fn by(&self, name: &str) -> ByParameter<'_, N, L> {
         ByParameter {
@@ -124,7 +128,7 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         }
     }
 
-    /// The derivatives by a parameter; `None` where none has this name.
+    /// The derivatives with respect to a parameter; `None` if no parameter has this name.
     pub fn get(&self, name: &str) -> Option<ByParameter<'_, N, L>> {
         let place = self.parameters.iter().position(|own| own == name)?;
         Some(ByParameter {
@@ -133,7 +137,7 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         })
     }
 
-    /// The derivatives by the start.
+    /// The derivatives with respect to the start.
     pub fn by_start(&self) -> ByStart<'_, N, L> {
         ByStart { of: self }
     }
@@ -228,7 +232,7 @@ impl<const N: usize, L: Length<N>> fmt::Debug for Sensitive<N, L> {
     }
 }
 
-/// The derivatives of a motion by one parameter a.
+/// The derivatives of a motion with respect to one parameter a.
 #[derive(Clone, Copy, Debug)]
 pub struct ByParameter<'s, const N: usize, L: Length<N> = FixedLength> {
     of: &'s Sensitive<N, L>,
@@ -236,12 +240,12 @@ pub struct ByParameter<'s, const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
-    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at the last node, with its time.
+    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at the last node, with the time of that node.
     pub fn last(&self) -> Node<N, L> {
         self.of_node(self.of.motion.last().t, self.of.last())
     }
 
-    /// The same at all recorded nodes, in the order of [`Motion::states`].
+    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at all recorded nodes, in the order of [`Motion::states`].
     pub fn states(&self) -> Vec<Node<N, L>> {
         let nodes = self.of.motion.states().iter().zip(&self.of.nodes);
         nodes
@@ -249,8 +253,9 @@ impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
             .collect()
     }
 
-    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at any time of the motion: the derivatives of what [`Motion::at`] gives there, of its polynomials. At the time of an event they are those before it at that time, while those of
-    /// [`states`](Self::states) and [`last`](Self::last) are of the event, which moves.
+    /// ∂q/∂a, ∂p/∂a and ∂v/∂a at any time of the motion: the derivatives of what [`Motion::at`] returns. At the time
+    /// of an event, this is the derivative at that fixed time before the event, whereas [`states`](Self::states) and
+    /// [`last`](Self::last) follow the event, whose time changes with a.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -267,20 +272,21 @@ impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
     /// ```
     ///
     /// # Errors
-    /// As of [`Motion::at`].
+    /// As from [`Motion::at`].
     pub fn at(&self, time: f64) -> Result<Node<N, L>, AtError> {
         let Between { state, velocity } = self.of.between(time)?;
         Ok(self.of_columns(time, &state, &velocity))
     }
 
-    /// The derivatives of an output at all recorded nodes; `None` where the model declares no such name.
+    /// The derivatives of an output at all recorded nodes; `None` if the model declares no output of this name.
     pub fn output(&self, name: &str) -> Option<Vec<f64>> {
         let row = self.of.output(name)?;
         let values = (self.of.nodes.iter()).map(|one| one.outputs[(row, self.column)]);
         Some(values.collect())
     }
 
-    /// The derivative of the time of an event, by its place in [`Motion::events`]; `None` for those that are only recorded.
+    /// The derivative of the time of an event, by its index in [`Motion::events`]; `None` for events that are only
+    /// recorded.
     pub fn event_time(&self, event: usize) -> Option<f64> {
         let found = self.of.events.iter().find(|(own, _)| *own == event);
         found.and_then(|(_, slopes)| slopes.get(self.column).copied())
@@ -303,7 +309,8 @@ impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
     }
 }
 
-/// The derivatives of a motion by its start: matrices of 2N × 2N, ordered (p, q), whose blocks have names ([`Blocks`](crate::stability::Blocks)).
+/// The derivatives of a motion with respect to its start: matrices of 2N × 2N, ordered (p, q), whose blocks have names
+/// ([`Blocks`](crate::stability::Blocks)).
 #[derive(Clone, Copy, Debug)]
 pub struct ByStart<'s, const N: usize, L: Length<N> = FixedLength> {
     of: &'s Sensitive<N, L>,
@@ -315,15 +322,15 @@ impl<const N: usize, L: Length<N>> ByStart<'_, N, L> {
         self.matrix(&self.of.last().state)
     }
 
-    /// The same at any time of the motion, as [`ByParameter::at`].
+    /// ∂(p, q)/∂(p₀, q₀) at any time of the motion, as [`ByParameter::at`].
     ///
     /// # Errors
-    /// As there.
+    /// As from [`Motion::at`].
     pub fn at(&self, time: f64) -> Result<DMatrix<f64>, AtError> {
         Ok(self.matrix(&self.of.between(time)?.state))
     }
 
-    /// The same at all recorded nodes, in the order of [`Motion::states`].
+    /// ∂(p, q)/∂(p₀, q₀) at all recorded nodes, in the order of [`Motion::states`].
     pub fn matrices(&self) -> Vec<DMatrix<f64>> {
         (self
             .of
@@ -333,7 +340,8 @@ impl<const N: usize, L: Length<N>> ByStart<'_, N, L> {
         .collect()
     }
 
-    /// The gradients of an output at all recorded nodes, by q₀ and p₀; `None` where the model declares no such name.
+    /// The gradients of an output with respect to q₀ and p₀, at all recorded nodes; `None` if the model declares no
+    /// output of this name.
     pub fn output(&self, name: &str) -> Option<Vec<L::State>> {
         let row = self.of.output(name)?;
         let (like, n) = (&self.of.motion.last().q, self.of.coordinates());

@@ -6,18 +6,18 @@ use crate::periodic_schur::PeriodicSchurError;
 use std::fmt;
 use tfe_runtime::{LegendreError, StepError};
 
-/// Why there is no orbit.
+/// Why a periodic orbit was not found.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum OrbitError {
-    /// No period was given, neither a known one nor a guess.
+    /// No period was given, neither as a known value nor as a guess.
     NoPeriod,
-    /// The period is not positive: as given, or as found.
+    /// The period, as given or as found, is not positive.
     Period {
         /// Its value.
         period: f64,
     },
-    /// A number that was given is infinite, or none.
+    /// A number that was given is infinite or not a number.
     Number {
         /// What it is.
         what: &'static str,
@@ -26,59 +26,62 @@ pub enum OrbitError {
     },
     /// The model depends on time: the period of its orbits is that of the forcing (or a multiple), not an unknown.
     ForcedPeriod,
-    /// The mesh makes no sense.
+    /// The mesh is invalid.
     Mesh(MeshError),
-    /// The condition of phase names a coordinate that does not exist.
+    /// The phase condition names a coordinate that does not exist.
     Phase {
         /// Which.
         index: usize,
     },
-    /// The run that was to give the guess failed.
+    /// The run that was to provide the first guess failed.
     Guess(RunErrorKind),
-    /// A motion of an orbit with events failed.
+    /// A run of a motion with events failed.
     Run(RunErrorKind),
-    /// An event stopped a motion before its period had passed.
+    /// An event stopped a motion before the end of its period.
     Stopped {
         /// When.
         time: f64,
     },
-    /// Events leave a parameter with another value than it has at the start: the state comes back, the model does not.
+    /// At the end of the period, events have left a parameter with another value than at the start: the state repeats,
+    /// the model does not.
     ParameterLeft {
         /// The parameter.
         parameter: String,
         /// Its value at the end.
         value: f64,
     },
-    /// Corrections no longer bring the end of a motion with events nearer to its start.
+    /// For orbits with events: Newton's corrections no longer bring the end of the motion nearer to its start.
     Stalled {
         /// How far they are apart, in parts of the motion.
         residual: f64,
         /// Corrections so far.
         iterations: u32,
     },
-    /// Orbits with events are not found for models with constraints: minimal coordinates are needed.
+    /// Orbits with events are not supported for models with constraints; declare the model in minimal coordinates.
     HybridConstraints,
-    /// Something was asked for that models of this kind cannot do, or that has no meaning for orbits of this kind.
+    /// The call is not supported for this kind of model, or has no meaning for orbits of this kind.
     Unsupported {
         /// The call.
         call: &'static str,
         /// The kind of models, or of orbits.
         of: &'static str,
     },
-    /// The motion that was found does not move: an equilibrium, which repeats after any time, or a period that shrinks to nothing.
+    /// The solution found does not move: it is an equilibrium, which repeats after any time, or the period shrinks to
+    /// zero.
     AtRest,
-    /// The assembled equations were not solved.
+    /// The assembled equations could not be solved.
     Assembly(AssemblyError),
-    /// An autonomous model has no orbit of this period: the equations can only be met with an additional force γ v.
+    /// An autonomous model has no orbit of this period: the equations hold only with an additional force γ v.
     NoFamily {
         /// The γ that would be needed.
         unfolding: f64,
     },
-    /// The constraints do not span the same motions at all nodes, or the model has no velocity at one.
+    /// The constraints do not allow the same number of independent motions at all nodes, or no velocity belongs to the
+    /// momenta at a node.
     Constraints(StepError),
     /// The multipliers could not be computed.
     Multipliers(PeriodicSchurError),
-    /// A model of run-time length does not fit together, or its steps cannot be differentiated.
+    /// The lengths of a model of run-time length do not fit each other, or its steps cannot be differentiated.
     #[cfg(feature = "sparse")]
     Family(tfe_runtime::family::OperatorError),
 }

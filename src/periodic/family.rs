@@ -18,10 +18,10 @@ use shooting::Shooting;
 use tfe_runtime::family::{self, FamilyState};
 
 impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
-    /// Finds the orbit and its multipliers.
+    /// Finds the orbit and its Floquet multipliers.
     ///
     /// # Errors
-    /// [`OrbitError`]: what was asked for makes no sense, or there is no solution near the guess.
+    /// [`OrbitError`] if a setting is invalid, or if no orbit is found from the guess.
     pub fn solve(&self) -> Result<Orbit<'m, M, 0, RunTimeLength>, OrbitError> {
         orbit_of(self.solved()?)
     }

@@ -16,8 +16,10 @@ use nalgebra::{Complex, DMatrix, DVector};
 use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
-    /// An orbit of a simulation with [events](Simulation::on) that change the state: an oscillator that hits a wall, a machine that switches. The simulation brings model, element and events;
-    /// the orbit its steps. Of models with constraints no such orbits are found ([`OrbitError::HybridConstraints`]): declare minimal coordinates.
+    /// A periodic orbit of a simulation with [events](Simulation::on) that change the state (a hybrid system): an
+    /// oscillator that hits a wall, a machine that switches. Model, element and events are those of the simulation;
+    /// the step sizes follow from the number of elements in a period. Models with constraints are not supported
+    /// ([`OrbitError::HybridConstraints`]): declare them in minimal coordinates.
     ///
     /// ```
     /// use std::f64::consts::TAU;
@@ -65,17 +67,21 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     }
 }
 
-/// A periodic orbit with events, to be found; made by [`PeriodicOrbit::of_simulation`].
+/// The search for a periodic orbit with events; made by [`PeriodicOrbit::of_simulation`].
 ///
-/// Newton's method on the state at the start, and on the period where it is not known:
+/// Newton's method (single shooting) for the state at the start, and for the period if that is unknown:
 ///
 /// ```text
 /// y(T; y₀) − y₀ = (0, advance) ,     (A − 1) δy₀ + ẏ(T) δT = −r                                         (T-142)
 /// ```
 ///
-/// with A of [`run_linearised`](Simulation::run_linearised), across events; of corrections that do the same, as of orbits that come in families, the shortest is taken, and corrections that make
-/// r larger are halved. The guess should meet the events of the orbit, and begin away from them. Where no correction is left but r is larger than roundings, as of a model that has no orbit of this period, or of a
-/// conservative one on elements that are too coarse, there is no orbit.
+/// with A the monodromy matrix across the events, from [`run_linearised`](Simulation::run_linearised). If orbits come
+/// in families, several corrections solve the equation, and the shortest is taken; corrections that make the residual
+/// r larger are halved.
+///
+/// The motion from the guess should meet the events of the orbit, and should not start at an event. If no correction
+/// reduces r, but r is larger than rounding errors, there is no orbit: the model has none of this period, or the
+/// elements are too coarse for a conservative model.
 #[derive(Debug)]
 pub struct HybridOrbits<'m, M, const N: usize> {
     pub(super) simulation: Simulation<'m, M, N>,
@@ -89,68 +95,69 @@ pub struct HybridOrbits<'m, M, const N: usize> {
 }
 
 impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
-    /// The number of elements of a period, 40 by default; events cut some of them.
+    /// Sets the number of elements in a period, 40 by default; events cut some of them.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
         self.elements = elements;
         self
     }
 
-    /// The time at which the period begins; 0 by default.
+    /// Sets the time at which the period begins; 0 by default.
     #[must_use]
     pub fn start_time(mut self, time: f64) -> Self {
         self.start = time;
         self
     }
 
-    /// The period, known: of the forcing, or a multiple of it.
+    /// Sets the period, if it is known: that of the forcing, or a multiple of it.
     #[must_use]
     pub fn period(mut self, period: f64) -> Self {
         self.period = Period::Known(period);
         self
     }
 
-    /// The period is to be found, near `guess`; for models that do not depend on time.
+    /// Makes the period an unknown, near `guess`; for models that do not depend on time.
     #[must_use]
     pub fn unknown_period(mut self, guess: f64) -> Self {
         self.period = Period::Guess(guess);
         self
     }
 
-    /// The state at which to begin.
+    /// Sets the first guess of the state at the start of the period.
     #[must_use]
     pub fn guess_from(mut self, state: State<N>) -> Self {
         self.guess = Some(state);
         self
     }
 
-    /// How much the coordinates grow over a period. Zero by default.
+    /// Sets by how much the coordinates grow over a period, for example a full turn of an angle; zero by default.
     #[must_use]
     pub fn advance(mut self, advance: [f64; N]) -> Self {
         self.advance = advance;
         self
     }
 
-    /// When the iteration is done: the relative size of the last correction, 10⁻¹³ by default; it ends as well where corrections below 10⁻⁹ shrink no more.
+    /// Sets when the iteration is finished: when the last correction, relative to the state, is at most this; 10⁻¹³ by
+    /// default. It also ends when corrections below 10⁻⁹ no longer shrink.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.tolerance = tolerance;
         self
     }
 
-    /// The most iterations of Newton's method, 50 by default.
+    /// Sets the largest number of iterations of Newton's method, 50 by default.
     #[must_use]
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.max_iterations = iterations;
         self
     }
 
-    /// Finds the orbit and its multipliers.
+    /// Finds the orbit and its Floquet multipliers.
     ///
     /// # Errors
-    /// [`OrbitError`]: [`Run`](OrbitError::Run) where a motion fails, [`Stalled`](OrbitError::Stalled) where no orbit is found near the guess, [`AtRest`](OrbitError::AtRest) where the
-    /// search for an unknown period comes to rest; models with constraints are
-    /// [not supported](OrbitError::HybridConstraints).
+    /// [`OrbitError`]: [`Run`](OrbitError::Run) if a motion fails, [`Stalled`](OrbitError::Stalled) if no orbit is
+    /// found from the guess, [`AtRest`](OrbitError::AtRest) if the search for an unknown period ends at an
+    /// equilibrium, [`HybridConstraints`](OrbitError::HybridConstraints) for models with constraints.
     pub fn solve(&self) -> Result<HybridOrbit<N>, OrbitError> {
         /// Corrections below this that shrink no more are roundings.
         const ROUNDED: f64 = 1e-9;
@@ -464,7 +471,7 @@ fn rate<M: Model<N>, const N: usize>(
     })
 }
 
-/// A periodic orbit with events and its Floquet multipliers; made by [`HybridOrbits::solve`].
+/// A periodic orbit with events, and its Floquet multipliers; made by [`HybridOrbits::solve`].
 #[derive(Clone, Debug)]
 pub struct HybridOrbit<const N: usize> {
     start: State<N>,
@@ -493,19 +500,21 @@ impl<const N: usize> HybridOrbit<N> {
         &self.motion
     }
 
-    /// The transition matrices of the elements in order, across events: 2N × 2N, ordered (p, q).
+    /// The transition matrices of the elements, in order and across events: 2N × 2N each, ordered (p, q).
     pub fn transitions(&self) -> &[DMatrix<f64>] {
         &self.transitions
     }
 
-    /// The monodromy matrix, 2N × 2N, ordered (p, q): the derivative of the state after a period by that before, with what events do to both the state and its changes.
-    /// Its entries are infinite, or no numbers, where multipliers are beyond 10³⁰⁸.
+    /// The monodromy matrix, 2N × 2N, ordered (p, q): the derivative of the state after a period with respect to the
+    /// state at its start, including the effect of events on the state and the change of their times. Entries beyond
+    /// 10³⁰⁸ are infinite or NaN.
     pub fn monodromy(&self) -> DMatrix<f64> {
         let identity = DMatrix::identity(2 * N, 2 * N);
         (self.transitions.iter()).fold(identity, |product, matrix| matrix * product)
     }
 
-    /// The Floquet multipliers, the largest modulus first; from the matrices of the elements, not from their product.
+    /// The Floquet multipliers, in order of decreasing modulus; computed from the matrices of the elements, not from
+    /// their product.
     pub fn multipliers(&self) -> &[Complex<f64>] {
         &self.multipliers
     }
@@ -515,22 +524,24 @@ impl<const N: usize> HybridOrbit<N> {
         &self.floquet
     }
 
-    /// The place of the multiplier that is one because the model does not depend on time; empty for a forced one, for a state of rest, and where the period is known and none is within 10⁻⁴ of one.
+    /// The index of the trivial multiplier, which is one because the model does not depend on time. Empty for a forced
+    /// model, for an equilibrium, and if the period was given and no multiplier is within 10⁻⁴ of one.
     pub fn trivial(&self) -> Vec<usize> {
         trivial_of(&self.floquet, self.trivial)
     }
 
-    /// Whether neighbours stay near: [`verdict`](Self::verdict) is not unstable.
+    /// Whether the orbit is not unstable, according to [`verdict`](Self::verdict), so that neighbouring motions stay
+    /// near.
     pub fn is_stable(&self) -> bool {
         !matches!(self.verdict(), Verdict::Unstable { .. })
     }
 
-    /// Stability, from all but the trivial multipliers, with its margin.
+    /// The stability of the orbit, from all multipliers except the trivial one, with its margin.
     pub fn verdict(&self) -> Verdict {
         Verdict::of(&self.floquet, &self.trivial())
     }
 
-    /// How many corrections Newton's method made.
+    /// The number of Newton's corrections.
     pub fn iterations(&self) -> u32 {
         self.iterations
     }

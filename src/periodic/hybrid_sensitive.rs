@@ -12,13 +12,17 @@ use nalgebra::DVector;
 use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> {
-    /// Finds the orbit as [`solve`](Self::solve) does, and how its start, its period and its multipliers change with each parameter of the model.
+    /// Finds the orbit as [`solve`](Self::solve) does, and the derivatives of its start, its period and its
+    /// multipliers with respect to each parameter of the model.
     ///
-    /// Start and period are differentiated as [`run_sensitive`](crate::Simulation::run_sensitive) differentiates a run, across its events; of the changes that keep the orbit closed the shortest is taken, and a known
-    /// period stays (`docs/theory.md`, (T-142)). Multipliers follow from differences of eighth order (T-157). What acts of events read of numbers that are no parameters is not differentiated.
+    /// Start and period are differentiated across events, as in [`run_sensitive`](crate::Simulation::run_sensitive);
+    /// of the changes that keep the orbit closed the shortest is taken, and a period that was given stays
+    /// (`docs/theory.md`, (T-142)). Derivatives of multipliers are differences of eighth order (T-157). If the
+    /// function of an event reads numbers that are not parameters of the model, the dependence on them is not
+    /// differentiated.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve); [`OrbitError::Run`] too where an event has no derivative.
+    /// As from [`solve`](Self::solve); also [`OrbitError::Run`] if an event has no derivative.
     pub fn solve_sensitive(&self) -> Result<SensitiveOrbit<HybridOrbit<N>, N>, OrbitError> {
         let orbit = self.solve()?;
         let (start, period) = (orbit.start(), orbit.period());

@@ -6,7 +6,7 @@ use crate::motion::{Motion, Node};
 use nalgebra::DMatrix;
 use tfe_runtime::{Model, State, Statistics};
 
-/// A [`Length`] whose models have periodic orbits.
+/// A [`Length`] whose models can have periodic orbits; internal.
 #[cfg_attr(
     not(feature = "sparse"),
     diagnostic::on_unimplemented(

@@ -24,20 +24,21 @@ pub struct Orbit<'m, M: 'm, const N: usize, L: Closed<M, N> = FixedLength> {
     unfolding: Option<f64>,
 }
 
-/// What an orbit does to its neighbours.
+/// The stability of a periodic orbit, by its Floquet multipliers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// All but the trivial multipliers are inside the unit circle: neighbours come nearer.
+    /// All multipliers except the trivial ones are inside the unit circle: neighbouring motions approach the orbit.
     Stable {
         /// 1 − max |μ|.
         margin: f64,
     },
-    /// The largest one is on the unit circle, to [`Verdict::NEUTRAL`], or all are trivial: the best that a conservative model can have.
+    /// The largest multiplier is on the unit circle, within [`Verdict::NEUTRAL`], or all are trivial. An orbit of a
+    /// conservative model cannot be more stable than that.
     Neutral {
         /// 1 − max |μ|.
         margin: f64,
     },
-    /// One is outside.
+    /// At least one multiplier is outside the unit circle: neighbouring motions depart from the orbit.
     Unstable {
         /// 1 − max |μ|, negative.
         margin: f64,
@@ -45,11 +46,12 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// How near to one a modulus counts as one: multipliers of conservative models come in multiple ones, which round-off moves by
-    /// its square root.
+    /// How near to one a modulus counts as one. Multipliers of conservative models are often multiple, and rounding
+    /// moves a double one by the square root of the rounding unit.
     ///
-    /// A block of k equal multipliers with one direction is moved by the k-th root, by some 10⁻⁵ for k = 3 and 10⁻⁴ for k = 4, as where a symmetry or a resonance adds ones to the trivial pair: a verdict
-    /// with so small a margin decides nothing.
+    /// A Jordan block of k equal multipliers is moved by the k-th root: by about 10⁻⁵ for k = 3 and 10⁻⁴ for k = 4, as
+    /// when a symmetry or a resonance adds ones to the trivial pair. In such a case a verdict with so small a margin
+    /// decides nothing.
     pub const NEUTRAL: f64 = 1e-7;
 
     /// From all multipliers but the trivial ones, by their places. Without any, neighbours neither come nearer nor go away: an oscillator of one coordinate.
@@ -67,10 +69,10 @@ impl Verdict {
     }
 }
 
-/// A Floquet exponent σ + iω = ln μ / T.
+/// A Floquet exponent (characteristic exponent) σ + iω = ln μ / T.
 ///
-/// The imaginary part is known up to multiples of 2π/T only: the multiplier cannot tell ω from ω + 2πk/T. Here it is the one of
-/// least modulus.
+/// The imaginary part is determined up to multiples of 2π/T only, because ω and ω + 2πk/T give the same multiplier.
+/// The value returned is the one of smallest modulus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exponent {
     /// Growth rate σ = ln |μ| / T, an inverse time; negative for decay.
@@ -80,7 +82,7 @@ pub struct Exponent {
 }
 
 impl Exponent {
-    /// The damping ratio ζ = −σ / √(σ² + ω²), with the frequency as it is.
+    /// The damping ratio ζ = −σ / √(σ² + ω²), with the frequency of smallest modulus.
     pub fn damping_ratio(&self) -> f64 {
         let modulus = self.growth.hypot(self.frequency);
         if modulus == 0.0 {
@@ -145,20 +147,22 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
         self.solution.start()
     }
 
-    /// The ends of the elements, in order; the last one is the first one a period later.
+    /// The nodes, in order; the last one is the first one a period later.
     pub fn nodes(&self) -> Vec<Node<N, L>> {
         self.solution.nodes()
     }
 
-    /// The transition matrices A_e of the elements in order, 2N × 2N, ordered (p, q).
+    /// The transition matrices A_e of the elements, in order: 2N × 2N each, ordered (p, q).
     pub fn transitions(&self) -> Vec<DMatrix<f64>> {
         self.solution.transitions()
     }
 
-    /// The monodromy matrix A_E ⋯ A_1, 2N × 2N, ordered (p, q): the derivative of the state after a period by that before.
+    /// The monodromy matrix A_E ⋯ A_1, 2N × 2N, ordered (p, q): the derivative of the state after a period with
+    /// respect to the state at its start.
     ///
-    /// Small multipliers of this matrix drown in the round-off of the large ones, and beyond 10³⁰⁸ its entries are infinite or no numbers; [`multipliers`](Self::multipliers) do not come from it, and
-    /// [`floquet`](Self::floquet) tells those of any size.
+    /// The small eigenvalues of this matrix are lost in the rounding errors of the large ones, and entries beyond
+    /// 10³⁰⁸ are infinite or NaN. [`multipliers`](Self::multipliers) are not computed from it, and
+    /// [`floquet`](Self::floquet) holds multipliers of any size.
     pub fn monodromy(&self) -> DMatrix<f64> {
         let start = self.start();
         let (_, p) = L::parts(&start);
@@ -169,20 +173,22 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
         })
     }
 
-    /// The Floquet multipliers μ, the largest modulus first, each to a relative accuracy of its own.
+    /// The Floquet multipliers μ, in order of decreasing modulus, each accurate relative to its own modulus.
     ///
-    /// An autonomous model has the trivial one, μ = 1, with the flow as its direction; a conservative one has it twice, as a defective
-    /// pair that is known to the square root of the accuracy only. See [`trivial`](Self::trivial).
+    /// An autonomous model has the trivial multiplier μ = 1, whose direction is the flow. A conservative one has it
+    /// twice, as a defective pair, which is accurate to the square root of the rounding unit only. See
+    /// [`trivial`](Self::trivial).
     pub fn multipliers(&self) -> &[Complex<f64>] {
         &self.multipliers
     }
 
-    /// The multipliers as logarithm of the modulus and argument, in the same order: also where the modulus is no `f64`.
+    /// The multipliers as logarithm of the modulus and argument, in the same order; valid also if the modulus is
+    /// outside the range of `f64`.
     pub fn floquet(&self) -> &[Multiplier] {
         &self.floquet
     }
 
-    /// The exponents ln μ / T, in the same order.
+    /// The Floquet exponents ln μ / T, in the same order.
     pub fn exponents(&self) -> Vec<Exponent> {
         let exponent = |multiplier: &Multiplier| Exponent {
             growth: multiplier.log_modulus / self.period(),
@@ -191,32 +197,34 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
         self.floquet.iter().map(exponent).collect()
     }
 
-    /// The trivial multipliers: the places, among [`multipliers`](Self::multipliers), of the one nearest to 1 for an autonomous model, of the two
-    /// nearest for a conservative one; empty for a forced one.
+    /// The indices of the trivial multipliers among [`multipliers`](Self::multipliers): the one nearest to 1 for an
+    /// autonomous model, the two nearest for a conservative one; none for a forced one.
     ///
-    /// How far they are from 1 says how good the others may be expected to be.
+    /// Their distance from 1 indicates the accuracy of the other multipliers.
     pub fn trivial(&self) -> Vec<usize> {
         trivial_of(&self.floquet, self.trivial)
     }
 
-    /// Whether neighbours stay near: [`verdict`](Self::verdict) is not unstable.
+    /// Whether the orbit is not unstable, according to [`verdict`](Self::verdict), so that neighbouring motions stay
+    /// near.
     pub fn is_stable(&self) -> bool {
         !matches!(self.verdict(), Verdict::Unstable { .. })
     }
 
-    /// Stability, from all but the trivial multipliers, with its margin.
+    /// The stability of the orbit, from all multipliers except the trivial ones, with its margin.
     pub fn verdict(&self) -> Verdict {
         Verdict::of(&self.floquet, &self.trivial())
     }
 
-    /// The force γ v that had to be added to close an orbit of an autonomous model whose period or energy was given: as small as
-    /// the discretization makes it. `None` for other orbits.
+    /// The factor γ of the force γ v that was added to the equations of an autonomous model with given period or
+    /// energy, to make them regular; it is as small as the discretisation error. `None` for other orbits.
     pub fn unfolding(&self) -> Option<f64> {
         self.unfolding
     }
 
-    /// Lengths for [`graded`](super::PeriodicOrbit::graded) that give each of so many elements the same piece of the orbit: arc length, with time, every
-    /// coordinate and every momentum scaled by its range. Relaxation oscillations need such elements.
+    /// Element lengths for [`graded`](super::PeriodicOrbit::graded) that give each of `elements` elements the same arc
+    /// length of the orbit, where time, every coordinate and every momentum are divided by their range. Use it for
+    /// relaxation oscillations, which alternate between fast and slow motion.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -241,12 +249,12 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
         self.solution.equidistributed(elements)
     }
 
-    /// What the solution cost.
+    /// Counts of iterations, evaluations and factorisations of the solution.
     pub fn statistics(&self) -> &Statistics {
         self.solution.statistics()
     }
 
-    /// The motion over one period, with dense output: the polynomials of the elements.
+    /// The motion over one period, with dense output from the polynomials of the elements.
     pub fn motion(&self) -> Motion<N, L> {
         self.solution.motion()
     }

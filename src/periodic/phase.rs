@@ -2,21 +2,21 @@
 
 use super::error::OrbitError;
 
-/// Which of the orbits of an autonomous model is meant: they differ in where the time begins.
+/// The phase condition: selects one of the orbits of an autonomous model that differ only in where the period begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub enum Phase {
-    /// Each correction is orthogonal to the flow, ∫ ẏ·δy dt = 0: the phase stays that of the guess.
+    /// Each Newton correction is orthogonal to the flow, ∫ ẏ·δy dt = 0, so that the phase stays that of the guess.
     #[default]
     Orthogonal,
-    /// A coordinate has this value at the start. The flow must cross it: q̇ ≠ 0 there.
+    /// A coordinate has a given value at the start. The orbit must cross that value: q̇ ≠ 0 there.
     Coordinate {
         /// Which coordinate.
         index: usize,
         /// Its value.
         value: f64,
     },
-    /// A momentum has this value at the start; zero for a turning point of a coordinate with a momentum of its own.
+    /// A momentum has a given value at the start; zero for a turning point of a coordinate with a momentum of its own.
     Momentum {
         /// Which momentum.
         index: usize,

@@ -13,10 +13,13 @@ use nalgebra::Complex;
 use tfe_runtime::{Element, Model, State};
 
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
-    /// Finds the orbit as [`solve`](Self::solve) does, and how its period, its start and its multipliers change with each parameter of the model.
+    /// Finds the orbit as [`solve`](Self::solve) does, and the derivatives of its period, its start and its
+    /// multipliers with respect to each parameter of the model.
     ///
-    /// Period and states are differentiated exactly, as solutions of the equations of the elements (`docs/theory.md`, (T-156)). What was given stays: a known period, the [energy](Self::energy) (that of the
-    /// guess where none was given), the condition of [phase](Self::phase). Multipliers follow from differences of eighth order of the matrices along that change (T-157).
+    /// Period and states are differentiated exactly, as solutions of the discrete equations (`docs/theory.md`,
+    /// (T-156)). What was prescribed stays: a known period, the [energy](Self::energy) (that of the guess if none was
+    /// given), the [phase condition](Self::phase). The derivatives of multipliers are differences of eighth order of
+    /// the matrices along that change (T-157).
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -39,7 +42,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// ```
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// As from [`solve`](Self::solve).
     pub fn solve_sensitive(&self) -> Result<SensitiveOrbit<Orbit<'m, M, N>, N>, OrbitError> {
         let (problem, iterate, assembly) = self.solved()?;
         let element = self.method().0;
@@ -156,7 +159,8 @@ impl<'m, M: Model<N>, const N: usize> Moving<'_, 'm, M, N> {
     }
 }
 
-/// An orbit, an [`Orbit`] or a [`HybridOrbit`](super::HybridOrbit), with its derivatives by the parameters of its model; made by [`PeriodicOrbit::solve_sensitive`] and
+/// An orbit ([`Orbit`] or [`HybridOrbit`](super::HybridOrbit)) with its derivatives with respect to the parameters of
+/// its model; made by [`PeriodicOrbit::solve_sensitive`] and
 /// [`HybridOrbits::solve_sensitive`](super::HybridOrbits::solve_sensitive).
 #[derive(Clone, Debug)]
 pub struct SensitiveOrbit<O, const N: usize, L: Length<N> = FixedLength> {
@@ -172,33 +176,35 @@ impl<O, const N: usize, L: Length<N>> SensitiveOrbit<O, N, L> {
         &self.orbit
     }
 
-    /// The names of the parameters, `m` or `k[2]`, in the order of the struct.
+    /// The names of the parameters, `m` or `k[2]`, in the order of the fields of the struct.
     pub fn parameters(&self) -> &[String] {
         &self.parameters
     }
 
-    /// The derivatives by a parameter.
+    /// The derivatives with respect to the parameter of this name.
     ///
     /// # Panics
-    /// Where no parameter has this name, as an index out of bounds does; [`get`](Self::get) does not.
+    /// If no parameter has this name; [`get`](Self::get) returns `None` instead.
     #[track_caller]
     pub fn by(&self, name: &str) -> &OrbitSlopes<N, L> {
         &self.slopes[place_of(name, &self.parameters)]
     }
 
-    /// The derivatives by a parameter; `None` where none has this name.
+    /// The derivatives with respect to a parameter; `None` if no parameter has this name.
     pub fn get(&self, name: &str) -> Option<&OrbitSlopes<N, L>> {
         let place = self.parameters.iter().position(|own| own == name)?;
         self.slopes.get(place)
     }
 
-    /// The derivatives by the period T where it was given. A parameter on which it depends, as the frequency ω of a force that repeats after T(ω), changes the orbit by `by("omega")` and by dT/dω times these.
+    /// The derivatives with respect to the period T, if that was given. A parameter on which the period depends, such
+    /// as the frequency ω of a force with T(ω) = 2π/ω, changes the orbit in total by `by("omega")` plus dT/dω times
+    /// these.
     pub fn by_period(&self) -> Option<&OrbitSlopes<N, L>> {
         self.by_period.as_ref()
     }
 }
 
-/// The derivatives of an orbit by one parameter a.
+/// The derivatives of an orbit with respect to one parameter a.
 #[derive(Clone, Debug)]
 pub struct OrbitSlopes<const N: usize, L: Length<N> = FixedLength> {
     pub(super) period: f64,
@@ -207,7 +213,7 @@ pub struct OrbitSlopes<const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> OrbitSlopes<N, L> {
-    /// ∂T/∂a; zero where the period is given.
+    /// ∂T/∂a; zero if the period is given.
     pub fn period(&self) -> f64 {
         self.period
     }
@@ -217,8 +223,9 @@ impl<const N: usize, L: Length<N>> OrbitSlopes<N, L> {
         self.start.clone()
     }
 
-    /// ∂μ/∂a in the order of [`Orbit::multipliers`], to some 1e-10 of it. Zero for trivial ones, which stay 1. `None` where differences do not tell it: where two multipliers meet, or where the model cannot be
-    /// made with another parameter.
+    /// ∂μ/∂a in the order of [`Orbit::multipliers`], with a relative error of about 1e-10; zero for trivial ones,
+    /// which stay at 1. `None` if differences cannot determine it: where two multipliers meet, or if the model cannot
+    /// be copied with another parameter.
     pub fn multipliers(&self) -> &[Option<Complex<f64>>] {
         &self.multipliers
     }

@@ -22,18 +22,20 @@ pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
     Start(L::State),
 }
 
-/// A periodic orbit to be found.
+/// The search for a periodic orbit of a model.
 ///
-/// - *Forced*: the model depends on time, its [`period`](Self::period) T is known. The default guess, rest, is enough for linear models. At resonance without damping there is none:
-///   [`AssemblyError::Singular`].
-/// - *Autonomous with damping or forces*: isolated orbits; T is unknown ([`unknown_period`](Self::unknown_period)) and a [`Phase`] is chosen.
-/// - *Conservative*: orbits come in families. Give the period, or with an unknown one the [`energy`](Self::energy) (that of the guess if none
-///   is given). The equations are made regular by an unfolding force γ v, which vanishes in the solution ([`Orbit::unfolding`]).
+/// - *Forced*: the model depends on time, and its [`period`](Self::period) T is known. The default guess, rest, is
+///   enough for linear models. At resonance without damping there is no orbit: [`AssemblyError::Singular`].
+/// - *Autonomous, with damping or forces*: orbits are isolated (limit cycles). T is unknown
+///   ([`unknown_period`](Self::unknown_period)), and a [`Phase`] condition is chosen.
+/// - *Conservative*: orbits come in families. Give the period, or make it unknown and give the
+///   [`energy`](Self::energy) (by default that of the guess). An unfolding force γ v, which vanishes in the solution,
+///   makes the equations regular ([`Orbit::unfolding`]).
 ///
-/// A search for an orbit of an autonomous model that comes to rest ends with [`OrbitError::AtRest`]. An equilibrium whose multipliers are asked for is that of a known period and a guess
-/// that does not move.
+/// A search for an orbit of an autonomous model that ends at an equilibrium is an error, [`OrbitError::AtRest`]. For
+/// the multipliers of an equilibrium, give the period and a guess that does not move.
 ///
-/// Defaults: `Mixed::<4>` (order 6), 40 equal elements, a solution to round-off.
+/// Defaults: element `Mixed::<4>` (order 6), 40 equal elements, a solution up to rounding.
 ///
 /// ```
 /// use std::f64::consts::TAU;
@@ -59,17 +61,18 @@ pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
 /// ```
 ///
 /// # Models of run-time length
-/// With the feature `sparse` elements are stepped from all nodes, with their derivatives by implicit differentiation of the step
-/// (`stability::TransitionOperator`): multiple shooting.
+/// With the feature `sparse`, periodic orbits of models of run-time length are found by multiple shooting: each
+/// element is a step from its node, with its derivative by implicit differentiation (`stability::TransitionOperator`).
 ///
 /// ```text
 /// δy_{e+1} − A_e δy_e − C_e δγ = Y_e(y_e, γ) − y_{e+1} ,   e = 0 … E − 1 ;      y_E = y_0                    (theory.md, (T-81), (T-82))
 /// ```
 ///
-/// The matrices A_e are dense, 2n × 2n, and so are the equations that close the chain and the multipliers: E (2n)² numbers of memory and of the order of
-/// 10 E (2n)³ operations an iteration. Tens of coordinates are quick, two hundred take minutes.
+/// The matrices A_e are dense, 2n × 2n, and so are the equations that close the chain. Memory is E (2n)² numbers, and
+/// an iteration takes on the order of 10 E (2n)³ operations. Tens of coordinates are quick, two hundred take minutes.
 ///
-/// The kinetic energy may be any of a Lagrangian; that of a Hamiltonian has to be ½ Σ p²/m. [`advance`](Self::advance) is refused.
+/// A Lagrangian may have any kinetic energy; a Hamiltonian must have ½ Σ p²/m. [`advance`](Self::advance) is not
+/// supported.
 #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
 pub struct PeriodicOrbit<'m, M, const N: usize, L: Length<N> = FixedLength> {
     pub(super) model: &'m M,
@@ -87,7 +90,7 @@ pub struct PeriodicOrbit<'m, M, const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
-    /// An orbit of `model`, with the defaults. For a model of run-time length the feature `sparse` is needed.
+    /// A search for an orbit of `model`, with the defaults. A model of run-time length needs the feature `sparse`.
     pub fn of(model: &'m M) -> Self
     where
         M: Declared<N, Length = L>,
@@ -108,14 +111,15 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         }
     }
 
-    /// The element: `Mixed::<6>`, `Element::primal(n)`, …
+    /// Sets the element: `Mixed::<6>`, `Element::primal(n)`, …
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = element.into();
         self
     }
 
-    /// The number of elements, all equally long: of this and [`graded`](Self::graded) the last call counts.
+    /// Sets the number of elements in the period, all of the same length. Of this call and [`graded`](Self::graded)
+    /// the last one counts.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
         self.elements = elements;
@@ -123,7 +127,8 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         self
     }
 
-    /// One element a weight, each as long as its weight says beside the others: short where much happens.
+    /// Sets one element for each weight, with lengths proportional to the weights: short elements where the motion is
+    /// fast.
     #[must_use]
     pub fn graded(mut self, weights: impl IntoIterator<Item = f64>) -> Self {
         self.weights = weights.into_iter().collect();
@@ -131,73 +136,77 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         self
     }
 
-    /// The time at which the period begins; 0 by default. What counts is where a forced model is then.
+    /// Sets the time at which the period begins, which matters for forced models; 0 by default.
     #[must_use]
     pub fn start_time(mut self, time: f64) -> Self {
         self.start = time;
         self
     }
 
-    /// The period, known.
+    /// Sets the period, if it is known.
     #[must_use]
     pub fn period(mut self, period: f64) -> Self {
         self.period = Period::Known(period);
         self
     }
 
-    /// The period is to be found, near `guess`.
+    /// Makes the period an unknown; the search begins at `guess`.
     #[must_use]
     pub fn unknown_period(mut self, guess: f64) -> Self {
         self.period = Period::Guess(guess);
         self
     }
 
-    /// Where to begin: a curve t ↦ (q, dq/dt), roughly the orbit.
+    /// Sets the first guess: a curve t ↦ (q, dq/dt) near the orbit.
     #[must_use]
     pub fn guess(mut self, curve: impl Fn(f64) -> (L::Vector, L::Vector) + 'm) -> Self {
         self.guess = Guess::Curve(Box::new(curve));
         self
     }
 
-    /// Where to begin: the motion that starts here, over one (guessed) period.
+    /// Sets the first guess: the motion that starts at this state, over one (guessed) period.
     #[must_use]
     pub fn guess_from(mut self, state: L::State) -> Self {
         self.guess = Guess::Start(state);
         self
     }
 
-    /// Which of the orbits that differ in phase; for autonomous models.
+    /// Sets the phase condition, for autonomous models: which of the orbits that differ only in their phase.
     #[must_use]
     pub fn phase(mut self, phase: Phase) -> Self {
         self.phase = phase;
         self
     }
 
-    /// The energy of the orbit of a conservative model with unknown period. Of other orbits it does not decide, and is refused: [`OrbitError::Unsupported`].
+    /// Sets the energy of the orbit, for conservative models with unknown period. For other orbits the energy is not
+    /// free, and the call is an error, [`OrbitError::Unsupported`].
     #[must_use]
     pub fn energy(mut self, energy: f64) -> Self {
         self.energy = Some(energy);
         self
     }
 
-    /// How much the coordinates grow over a period: a full turn for an angle that rotates. Zero by default.
+    /// Sets by how much the coordinates grow over a period, for example a full turn of an angle that rotates; zero by
+    /// default.
     #[must_use]
     pub fn advance(mut self, advance: L::Vector) -> Self {
         self.advance = Some(advance);
         self
     }
 
-    /// When the iteration is done: the relative size of the last correction, 10⁻¹³ by default. The correction that meets it is applied.
+    /// Sets when the iteration is finished: when the last correction, relative to the orbit, is at most this; 10⁻¹³ by
+    /// default. That correction is still applied.
     ///
-    /// Coordinates are measured by the largest of them, and so are momenta. Those that are much smaller, as an angle beside a distance, are corrected further for as long as that makes
-    /// them better, by at most six iterations.
+    /// Coordinates are measured relative to the largest coordinate, momenta relative to the largest momentum.
+    /// Components that are much smaller, such as an angle beside a distance, are corrected by up to six more
+    /// iterations for as long as these improve them.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
         self
     }
 
-    /// The most iterations of Newton's method, 50 by default.
+    /// Sets the largest number of iterations of Newton's method, 50 by default.
     #[must_use]
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.control.max_iterations = iterations;
@@ -246,10 +255,10 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
 }
 
 impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
-    /// Finds the orbit and its multipliers.
+    /// Finds the orbit and its Floquet multipliers.
     ///
     /// # Errors
-    /// [`OrbitError`]: what was asked for makes no sense, or there is no solution near the guess.
+    /// [`OrbitError`] if a setting is invalid, or if no orbit is found from the guess.
     pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
         let (problem, iterate, assembly) = self.solved()?;
         Orbit::new(self.element, &problem, iterate, &assembly)

@@ -4,13 +4,14 @@ use std::error::Error;
 use std::fmt;
 use tfe_runtime::StepError;
 
-/// Why the eigenvalues of a product were not found. Factors are counted from 0, in the order they are given.
+/// Why the eigenvalues of a product were not found. Factors are counted from 0, in the order in which they were given.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PeriodicSchurError {
-    /// There is no factor, hence no size.
+    /// The list of factors is empty.
     Empty,
-    /// The constraints of the model do not span the same motions at all nodes, or it has no velocity at one: there are no factors on them.
+    /// The constraints of the model do not allow the same number of independent motions at all nodes, or no velocity
+    /// belongs to the momenta at one: there are no transition matrices on the constraints.
     Constraints(StepError),
     /// A slice does not hold a whole number of factors.
     Length {
@@ -42,7 +43,7 @@ pub enum PeriodicSchurError {
         /// Which factor.
         index: usize,
     },
-    /// The QR iteration does not separate the eigenvalues of a diagonal block.
+    /// The QR iteration did not converge for a diagonal block.
     NoConvergence {
         /// The first row of the block, from 0.
         first: usize,

@@ -5,7 +5,8 @@ use crate::sensitivity::loss::LossGradient;
 use crate::sensitivity::names::place_of;
 use nalgebra::DMatrix;
 
-/// The second derivatives of a loss by some parameters, from [`Simulation::hessian`](crate::Simulation::hessian).
+/// The second derivatives of a loss with respect to some parameters, from
+/// [`Simulation::hessian`](crate::Simulation::hessian).
 #[derive(Clone, Debug)]
 pub struct LossHessian<const N: usize, L: Length<N> = FixedLength> {
     value: f64,
@@ -38,12 +39,12 @@ impl<const N: usize, L: Length<N>> LossHessian<N, L> {
         }
     }
 
-    /// The loss.
+    /// The value of the loss.
     pub fn value(&self) -> f64 {
         self.value
     }
 
-    /// Its gradient, by all parameters and by the start, with the motion.
+    /// The gradient of the loss with respect to all parameters and the start, with the motion.
     pub fn gradient(&self) -> &LossGradient<N, L> {
         &self.gradient
     }
@@ -53,21 +54,23 @@ impl<const N: usize, L: Length<N>> LossHessian<N, L> {
         &self.names
     }
 
-    /// ∂²ℓ/∂a∂b
+    /// The second derivative ∂²ℓ/∂a∂b with respect to two parameters.
     ///
     /// # Panics
-    /// Where one of the names was not asked for.
+    /// If one of the names was not asked for.
     #[track_caller]
     pub fn by(&self, a: &str, b: &str) -> f64 {
         self.matrix[(place_of(a, &self.names), place_of(b, &self.names))]
     }
 
-    /// All of them: symmetric, rows and columns in the order of [`parameters`](Self::parameters).
+    /// The matrix of all second derivatives: symmetric, rows and columns in the order of
+    /// [`parameters`](Self::parameters).
     pub fn matrix(&self) -> &DMatrix<f64> {
         &self.matrix
     }
 
-    /// Estimates of their errors: how far differences of eighth and of sixth order are apart, with what roundings of the gradient are of them, and ∂²ℓ/∂a∂b and ∂²ℓ/∂b∂a.
+    /// Estimates of the absolute errors of [`matrix`](Self::matrix): the difference between formulas of eighth and of
+    /// sixth order, the effect of rounding in the gradients, and the difference between ∂²ℓ/∂a∂b and ∂²ℓ/∂b∂a.
     pub fn errors(&self) -> &DMatrix<f64> {
         &self.errors
     }

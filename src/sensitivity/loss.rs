@@ -10,8 +10,9 @@ use std::fmt;
 use std::sync::Arc;
 use tfe_runtime::CoordinateName;
 
-/// A number of a motion whose gradient is asked for: a sum of functions of its end, of outputs at the end, of integrals of outputs, and of squares of what outputs are off from values given. For
-/// [`Simulation::gradient`](crate::Simulation::gradient).
+/// A loss: a number computed from a motion, whose gradient is wanted. It is a sum of functions of the end of the
+/// motion, of outputs at the end, of time integrals of outputs, and of squared deviations of outputs from measured
+/// values. Used by [`Simulation::gradient`](crate::Simulation::gradient).
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -49,16 +50,18 @@ impl<const N: usize, L: Length<N>> Term<'_, N, L> {
 }
 
 impl<'l, const N: usize> Loss<'l, N> {
-    /// A function of the last node of a model of fixed size; of a model of any length [`of_end`](Self::of_end) is. It is differentiated by differences of sixth order; what is an output of
-    /// the model is differentiated exactly.
+    /// A function of the last node, for models of fixed size; [`of_end`](Self::of_end) is for models of either kind.
+    /// Its derivatives are differences of sixth order; an output of the model ([`output_at_end`](Self::output_at_end))
+    /// is differentiated exactly.
     pub fn at_end(function: impl Fn(&Node<N>) -> f64 + Send + Sync + 'l) -> Self {
         Self::of(Term::End(Arc::new(function)))
     }
 }
 
 impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
-    /// A function of coordinates, momenta and velocities at the end, of a model of any length. It is differentiated by differences of sixth order; what is an output of the model is
-    /// differentiated exactly.
+    /// A function of the coordinates, momenta and velocities at the end, in this order, for models of either kind of
+    /// length. Its derivatives are differences of sixth order; an output of the model
+    /// ([`output_at_end`](Self::output_at_end)) is differentiated exactly.
     ///
     /// ```
     /// use tfe::family::Loss;
@@ -75,12 +78,13 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         Self::of(Term::End(Arc::new(of_node)))
     }
 
-    /// The value of an output at the end.
+    /// The value of an output of the model at the end of the motion.
     pub fn output_at_end(name: impl Into<String>) -> Self {
         Self::of(Term::Output(name.into()))
     }
 
-    /// ∫ y dt of an output y over the span, as [`Motion::integral`] has it, by the Gauss points of every element: a running loss.
+    /// A running loss ∫ y dt of an output y over the span, by the Gauss points of every element, as
+    /// [`Motion::integral`] computes it.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -101,7 +105,8 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         Self::of(Term::Integral(name.into()))
     }
 
-    /// ½ Σ (y(t_i) − m_i)² of an output y. Elements end at the times t_i, which lie in the span.
+    /// Least squares ½ Σ (y(t_i) − m_i)² of an output y and measured values m_i. Elements end at the times t_i, which
+    /// must lie in the span.
     pub fn squares(
         name: impl Into<String>,
         times: impl AsRef<[f64]>,
@@ -111,7 +116,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         Self::of(Term::Squares(name.into(), times, values))
     }
 
-    /// A multiple of it.
+    /// Multiplies the loss by a factor, for example a weight.
     #[must_use]
     pub fn times(mut self, factor: f64) -> Self {
         for (own, _) in &mut self.terms {
@@ -126,7 +131,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         }
     }
 
-    /// The sum of two.
+    /// The sum of two losses.
     #[must_use]
     pub fn and(mut self, other: Self) -> Self {
         self.terms.extend(other.terms);
@@ -368,7 +373,7 @@ fn partial<const N: usize, L: Length<N>>(
     }
 }
 
-/// The gradient of a loss, from [`Simulation::gradient`](crate::Simulation::gradient).
+/// A loss of a motion and its gradient, from [`Simulation::gradient`](crate::Simulation::gradient).
 #[derive(Clone, Debug)]
 pub struct LossGradient<const N: usize, L: Length<N> = FixedLength> {
     motion: Motion<N, L>,
@@ -411,32 +416,32 @@ impl<const N: usize, L: Length<N>> LossGradient<N, L> {
         })
     }
 
-    /// The derivative by a parameter.
+    /// The derivative with respect to the parameter of this name.
     ///
     /// # Panics
-    /// Where no parameter has this name; [`get`](Self::get) does not.
+    /// If no parameter has this name; [`get`](Self::get) returns `None` instead.
     #[track_caller]
     pub fn by(&self, name: &str) -> f64 {
         self.by_parameters[place_of(name, &self.names)]
     }
 
-    /// The derivative by a parameter; `None` where none has this name.
+    /// The derivative with respect to a parameter; `None` if no parameter has this name.
     pub fn get(&self, name: &str) -> Option<f64> {
         let place = self.names.iter().position(|own| own == name)?;
         self.by_parameters.get(place).copied()
     }
 
-    /// The derivatives by all parameters, in the order of [`parameters`](Self::parameters).
+    /// The derivatives with respect to all parameters, in the order of [`parameters`](Self::parameters).
     pub fn by_parameters(&self) -> &[f64] {
         &self.by_parameters
     }
 
-    /// The names of the parameters, in the order of the struct.
+    /// The names of the parameters, in the order of the fields of the struct.
     pub fn parameters(&self) -> &[String] {
         &self.names
     }
 
-    /// The derivatives by q and p of the start.
+    /// The derivatives with respect to the coordinates q and momenta p of the start.
     pub fn by_start(&self) -> L::State {
         self.by_start.clone()
     }

@@ -19,11 +19,12 @@ use tfe_runtime::dual::Dual;
 use tfe_runtime::family::{self, FamilyState};
 
 impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
-    /// Finds the orbit as [`solve`](Self::solve) does, and how its period, its start and its multipliers change with each parameter: as of models of fixed size, with a solution for each parameter besides and, for
-    /// the multipliers, the matrices of eight to twenty-four neighbours.
+    /// Finds the orbit as [`solve`](Self::solve) does, and the derivatives of its period, its start and its
+    /// multipliers with respect to each parameter, as for models of fixed size. Each parameter costs one more solution
+    /// and, for the multipliers, the transition matrices of eight to twenty-four neighbouring orbits.
     ///
     /// # Errors
-    /// As [`solve`](Self::solve).
+    /// As from [`solve`](Self::solve).
     pub fn solve_sensitive(
         &self,
     ) -> Result<SensitiveOrbit<Orbit<'m, M, 0, RunTimeLength>, 0, RunTimeLength>, OrbitError> {
