@@ -1,9 +1,9 @@
 //! Models of run-time length: `coordinates(q[n])` with n a field of the struct.
 //!
-//! [`Simulation::new`](crate::Simulation::new) runs them as it runs models of fixed size. Types of runs and motions are the same, with a last parameter [`RunTimeLength`], which the aliases here
-//! give.
+//! [`Simulation::new`](crate::Simulation::new) takes them like models of fixed size. The types of runs and motions are
+//! the same, with the last type parameter [`RunTimeLength`]; this module has aliases for them.
 //!
-//! Who is joined to whom may be a list, and an output may be one number for each site:
+//! Connections between sites may be given by a list of indices, and an output may be one number for each site:
 //!
 //! ```
 //! use tfe::prelude::*;
@@ -59,7 +59,7 @@ pub type LossGradient = crate::sensitivity::LossGradient<0, RunTimeLength>;
 pub type Steps<'m, M> = crate::Steps<'m, M, 0, RunTimeLength>;
 /// [`Driven`](crate::Driven), a model of run-time length with its inputs.
 pub type Driven<'m, M> = crate::Driven<'m, M, RunTimeLength>;
-/// [`Held`](crate::Held), a loop of control of a model of run-time length.
+/// [`Held`](crate::Held), a control loop of a model of run-time length.
 pub type Held<'m, M> = crate::Held<'m, M, 0, RunTimeLength>;
 /// [`Checkpoint`](crate::Checkpoint) of a model of run-time length.
 pub type Checkpoint = crate::Checkpoint<0, RunTimeLength>;

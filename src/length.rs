@@ -7,10 +7,11 @@ use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::step::{DenseElement, Impulse, Stepper, Suspended};
 use tfe_runtime::{CoordinateName, State};
 
-/// What runs and motions consist of: [`FixedLength`] keeps numbers in arrays, [`RunTimeLength`] in vectors. There is no third.
+/// The kind of length of a model, which determines the vectors of its states: arrays for [`FixedLength`], `Vec`s for
+/// [`RunTimeLength`]. There is no other kind.
 ///
-/// A [`Motion<N>`](crate::Motion) is one of `FixedLength`; of a model of run-time length it is a `Motion<0, RunTimeLength>`, or
-/// [`family::Motion`](crate::family::Motion).
+/// A [`Motion<N>`](crate::Motion) belongs to `FixedLength`; the motion of a model of run-time length is a `Motion<0,
+/// RunTimeLength>`, or [`family::Motion`](crate::family::Motion) for short.
 pub trait Length<const N: usize>: Copy + Debug + PartialEq + Send + Sync + 'static {
     /// Coordinates, momenta or velocities.
     type Vector: Clone + Debug + PartialEq + AsRef<[f64]> + Send + Sync;
@@ -96,7 +97,7 @@ impl Length<0> for RunTimeLength {
     }
 }
 
-/// The solution inside an element, or inside its pieces if it was cut.
+/// The polynomial solution inside an element, or inside the pieces into which it was cut; internal.
 pub trait Polynomial: Clone + Debug {
     /// A point of phase space.
     type State;

@@ -1,4 +1,5 @@
-//! Linearised behaviour of steps: transition matrices, their spectra, and the steps at which a method fails.
+//! Linear stability: transition matrices of steps, their eigenvalues, modes, and the step sizes at which a method is
+//! unstable.
 
 mod arnoldi;
 mod blocks;
@@ -36,18 +37,20 @@ use std::ops::Range;
 use tfe_runtime::length::Declared;
 use tfe_runtime::{Element, Model, State};
 
-/// The transition matrix of one element: the derivative of the step map (p, q) ↦ (p, q) at `state`.
+/// The transition matrix A of one element (time step): the derivative of the step map (p, q) ↦ (p, q) at `state`.
 ///
 /// ```text
 /// (δp₁, δq₁) = A (δp₀, δq₀)                                       (theory.md, transition matrices; the paper's (27))
 /// ```
 ///
-/// Of a model of run-time length too, with the feature `sparse`; for a long one take `transition`, which is no matrix but an operator.
+/// With the feature `sparse` also for models of run-time length; for a long one use `transition`, which gives an
+/// operator instead of a dense matrix.
 ///
 /// # Shapes
 /// 2N × 2N, ordered (p, q); [`Blocks`] names its four blocks.
 /// # Errors
-/// [`TransitionError`] (or `family::OperatorError`) where the element does not exist, cannot be solved, or has a singular tangent.
+/// [`TransitionError`] (or `family::OperatorError`) if the element does not exist, cannot be solved, or has a singular
+/// tangent.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -78,20 +81,22 @@ where
     Ok(M::Length::step(model, element.into(), state, t, h)?.0)
 }
 
-/// The transition matrix of one element on the motions that the constraints of the model allow: in the orthonormal bases
-/// [`tangent_basis`](crate::constraints::tangent_basis) B₀ and B₁ at the two ends of the element,
+/// The transition matrix of one element restricted to the variations that the constraints of the model allow, in the
+/// orthonormal bases [`tangent_basis`](crate::constraints::tangent_basis) B₀ and B₁ at the two ends of the element,
 ///
 /// ```text
 /// B₁ᵀ A B₀                                                                (theory.md (T-78))
 /// ```
 ///
-/// No direction violates a constraint and no eigenvalue is zero because of one. Where the same motions are allowed at both ends (to √ε, as beside an equilibrium
-/// that is known to roundings), B₁ is B₀, and the eigenvalues are those of the motion itself; elsewhere multiply matrices along the motion, as [`Linearised::multipliers`](crate::Linearised::multipliers) does.
+/// No direction violates a constraint, and no zero eigenvalue belongs to one. If the same variations are allowed at
+/// both ends (within √ε, as at an equilibrium known up to rounding), B₁ is B₀, and the eigenvalues are those of the
+/// motion. Elsewhere, multiply the matrices along the motion, as
+/// [`Linearised::multipliers`](crate::Linearised::multipliers) does.
 ///
 /// # Shapes
-/// 2N − 2h − n rows and columns with h independent holonomic constraints and n others.
+/// 2N − 2h − n rows and columns, with h independent holonomic constraints and n others.
 /// # Errors
-/// As for [`transition_matrix`], and where the model has no velocity at an end.
+/// As from [`transition_matrix`]; also if no velocity belongs to the momenta at an end.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -136,28 +141,30 @@ fn spans_the_same(one: &DMatrix<f64>, other: &DMatrix<f64>) -> bool {
     one.shape() == other.shape() && (other - one * one.tr_mul(other)).amax() <= f64::EPSILON.sqrt()
 }
 
-/// Every interval of step size in which a motion about an equilibrium grows, however right the model: ascending, apart from each other.
+/// All intervals of the step size in which the method is unstable about an equilibrium: ascending and disjoint.
 ///
-/// With A(h) the transition matrix of one element of length h about the equilibrium at t = 0, the h in `steps` with
+/// With A(h) the transition matrix of one element of length h about the equilibrium at t = 0, these are the h in
+/// `steps` with
 ///
 /// ```text
 /// ρ(A(h)) > 1 ,     ρ = max |λ| ;
 /// ```
 ///
-/// where the model itself is stable, the method fails there. Primal elements have such intervals near half periods of every mode,
-/// the paper's "bubbles", and grow beyond a last limit; the mixed ones have none. A model that is unstable itself, like an inverted
-/// pendulum, is so for all small steps.
+/// If the model itself is stable, the method fails at these step sizes. Primal elements have such intervals near half
+/// periods of every mode (the paper's "bubbles"), and are unstable beyond a last limit; mixed elements have none. A
+/// model that is itself unstable, such as an inverted pendulum, is so for all small steps.
 ///
-/// The ends are located by root finding, to a relative accuracy of about 10⁻¹². See [`unstable_intervals_of`] for the method, its tolerances and
-/// its cost: some thousand transition matrices. `steps` may begin at zero. Where a growing or a decaying mode is wanted for another
-/// parameter than the step (a speed, a stiffness), use that function with [`transition_matrix`].
+/// The ends of the intervals are located by root finding, to a relative accuracy of about 10⁻¹². See
+/// [`unstable_intervals_of`] for the method, its tolerances and its cost (some thousand transition matrices). `steps`
+/// may begin at zero. For stability as a function of another parameter than the step size (a speed, a stiffness), use
+/// that function with [`transition_matrix`].
 ///
 /// # Not guaranteed
-/// `equilibrium` is not checked: elsewhere A is the derivative of one step from there, and says little about the next. Of a model
-/// that depends on time only the element at t = 0 is seen.
+/// `equilibrium` is not checked: elsewhere A is the derivative of one step from there, and says little about the next
+/// one. For a model that depends on time, only the element at t = 0 is examined.
 /// # Errors
-/// [`IntervalError::Range`] for an empty range; [`IntervalError::Matrix`] where there is no transition matrix, with the reason;
-/// [`IntervalError::Unresolved`] for a model that is not smooth at the equilibrium.
+/// [`IntervalError::Range`] for an empty range; [`IntervalError::Matrix`] if there is no transition matrix, with the
+/// reason; [`IntervalError::Unresolved`] for a model that is not smooth at the equilibrium.
 /// # Reference
 /// theory.md (T-57), the intervals of the oscillator.
 ///
@@ -200,16 +207,19 @@ pub fn unstable_intervals<M: Model<N>, const N: usize>(
     unstable_intervals_of(matrix, steps)
 }
 
-/// The largest modulus of an eigenvalue of a square matrix, max |λ|; zero for an empty one.
+/// The spectral radius of a square matrix: the largest modulus of an eigenvalue, max |λ|; zero for an empty matrix.
 ///
-/// NaN where [`eigenvalues()`] is an error: if the matrix is not square, an entry is not finite, or the iteration does not converge.
+/// NaN if [`eigenvalues()`] returns an error: if the matrix is not square, an entry is not finite, or the iteration
+/// does not converge.
 pub fn spectral_radius(matrix: &DMatrix<f64>) -> f64 {
     eigenvalues(matrix).map_or(f64::NAN, |values| largest_modulus(&values))
 }
 
-/// How far a transition matrix is from symplectic: the largest entry of |AᵀJA − J|, J = [[0, −1], [1, 0]] in the order (p, q).
+/// The distance of a transition matrix from being symplectic: the largest entry of |AᵀJA − J|, with J = [[0, −1], [1,
+/// 0]] in the order (p, q).
 ///
-/// Zero to round-off for symplectic elements and models without forces. NaN for a matrix of odd size, or with an entry that is NaN.
+/// Zero up to rounding for symplectic elements and models without forces. NaN for a matrix of odd size or with an
+/// entry that is NaN.
 pub fn symplecticity_defect(matrix: &DMatrix<f64>) -> f64 {
     let size = matrix.nrows();
     if !matrix.is_square() || !size.is_multiple_of(2) {

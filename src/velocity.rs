@@ -5,7 +5,7 @@ use crate::length::{FixedLength, Length, RunTimeLength};
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::{Model, State};
 
-/// The velocities that belong to states of a model.
+/// Computes the velocities dq/dt that belong to the momenta of a state.
 pub trait Velocity<const N: usize, L: Length<N> = FixedLength>: Evaluate<N, L> {
     /// dq/dt of a state at the time t: v with ∂L/∂v = p, or ∂H/∂p. Where the mass matrix is singular it is the velocity that constraints leave (theory.md (T-74)), NaN where they leave none, where the iteration for v of a kinetic
     /// energy that is not quadratic fails, or, as long as the state, where that is not as long as the model.

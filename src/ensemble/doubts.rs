@@ -6,15 +6,17 @@ use crate::motion::Node;
 use crate::simulation::is_jump;
 use std::fmt;
 
-/// How many runs of an ensemble are doubtful although they came to their ends, by the kinds of [`Warning`](crate::Warning) that a single run would give; [`Ends::warnings`](super::Ends::warnings).
+/// How many runs of an ensemble may be wrong although they reached their ends, by the kind of
+/// [`Warning`](crate::Warning) that a single run would give; from [`Ends::warnings`](super::Ends::warnings).
 ///
-/// Energies are compared at the ends of the span only: what a run loses and regains in between is not seen.
+/// Energies are compared at the ends of the span only: what a run loses and regains in between is not noticed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct WarningCounts {
     /// Runs that end with an energy that is not finite: [`Warning::EnergyNotFinite`](crate::Warning::EnergyNotFinite).
     pub energy_not_finite: usize,
-    /// Runs that end with another energy than they began with, although the model conserves it: [`Warning::EnergyJump`](crate::Warning::EnergyJump).
+    /// Runs that end with another energy than they began with, although the model conserves it:
+    /// [`Warning::EnergyJump`](crate::Warning::EnergyJump).
     pub energy_jump: usize,
 }
 
@@ -43,7 +45,7 @@ impl WarningCounts {
         self.energy_jump += other.energy_jump;
     }
 
-    /// Whether there are none.
+    /// Whether no run has a warning.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }

@@ -20,12 +20,12 @@ pub struct Ends<const N: usize, L: Length<N> = FixedLength> {
     warnings: WarningCounts,
 }
 
-/// A run that stopped before its end.
+/// A run that did not reach the end of the span.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Failure<'a> {
-    /// Which run, from 0.
+    /// The index of the run, from 0.
     pub index: usize,
-    /// Where and why.
+    /// Where and why the run stopped.
     pub kind: &'a RunErrorKind,
 }
 
@@ -52,7 +52,7 @@ impl<const N: usize, L: Length<N>> Ends<N, L> {
         self.results.is_empty()
     }
 
-    /// The result of run `index`; `None` beyond the last.
+    /// The result of run `index`; `None` if there is no such run.
     pub fn get(&self, index: usize) -> Option<&Result<Node<N, L>, RunErrorKind>> {
         self.results.get(index)
     }
@@ -62,14 +62,14 @@ impl<const N: usize, L: Length<N>> Ends<N, L> {
         self.results.iter()
     }
 
-    /// The ends of all runs that came to theirs, in order.
+    /// The end nodes of all runs that reached the end of the span, in order.
     pub fn nodes(&self) -> impl Iterator<Item = &Node<N, L>> {
         self.results
             .iter()
             .filter_map(|result| result.as_ref().ok())
     }
 
-    /// The runs that did not, in order.
+    /// The runs that did not reach the end of the span, in order.
     pub fn failures(&self) -> impl Iterator<Item = Failure<'_>> {
         self.results
             .iter()
@@ -80,12 +80,12 @@ impl<const N: usize, L: Length<N>> Ends<N, L> {
             })
     }
 
-    /// What all runs together have cost.
+    /// Counts of iterations, evaluations and factorisations of all runs together.
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
     }
 
-    /// How many runs came to their ends and are doubtful, by kind.
+    /// How many of the runs that reached their ends may be wrong, by the kind of warning.
     pub fn warnings(&self) -> &WarningCounts {
         &self.warnings
     }

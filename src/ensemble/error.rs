@@ -8,9 +8,9 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum EnsembleError {
-    /// The element does not exist, or step or span are none.
+    /// The element does not exist, or the step size or the span is invalid.
     Run(RunErrorKind),
-    /// There is neither one start for all models nor one for each.
+    /// The number of starts is neither one nor the number of models.
     Starts {
         /// How many models there are.
         models: usize,

@@ -21,7 +21,8 @@ where
     M: family::Model + Sync,
     K: Models<'m, M>,
 {
-    /// Runs all trajectories over the span, backwards where it ends before it starts. Each result is the node at the end, or why its run stopped; a failure stops no other run.
+    /// Runs all trajectories over the span, backwards in time if it ends before it starts. Each result is the node at
+    /// the end, or the error of that run; a failure does not stop other runs.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -45,8 +46,9 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`EnsembleError`] where nothing can run: the element does not exist, step or span are not finite, the number of starts is not that of models. A bad start, and a model whose lengths do
-    /// not fit together, are failures of their own run only.
+    /// [`EnsembleError`] if nothing can run: the element does not exist, the step size or the span is not finite, or
+    /// the number of starts does not fit the number of models. An invalid start, or a model whose lengths do not fit
+    /// each other, fails its own run only.
     pub fn run(
         &self,
         starts: &[FamilyState],
@@ -63,9 +65,10 @@ where
         Ok(unlock(results).into_ends(statistics))
     }
 
-    /// Runs all trajectories and hands over each result, with the index of its run, as soon as it is known: in no particular order, and with the feature `parallel` from several threads.
+    /// Runs all trajectories, and hands over each result with the index of its run as soon as it is known: in no
+    /// particular order, and with the feature `parallel` from several threads.
     ///
-    /// Returns what all runs together have cost.
+    /// Returns the cost of all runs together.
     ///
     /// # Errors
     /// As from [`run`](Self::run).

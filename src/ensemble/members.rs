@@ -6,7 +6,7 @@ use tfe_runtime::bundle::{Bundle, One, Trajectories, Varied};
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, ElementError, Model, State};
 
-/// The models of an ensemble, of either kind of length.
+/// The models of an ensemble, of either kind of length; internal.
 pub trait Models<'m, M>: Copy + Sync + 'm {
     /// The model of one run.
     fn model(&self, index: usize) -> &'m M;
@@ -45,11 +45,11 @@ pub trait Members<'m, M: Model<N>, const N: usize>: Models<'m, M> {
     );
 }
 
-/// One model in all runs.
+/// The same model in all runs.
 #[derive(Debug)]
 pub struct OneModel<'m, M>(pub(super) &'m M);
 
-/// A model for every run.
+/// A model for each run.
 #[derive(Debug)]
 pub struct ManyModels<'m, M>(pub(super) &'m [M]);
 

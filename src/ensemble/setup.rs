@@ -18,7 +18,7 @@ use tfe_runtime::bundle::Bundle;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 
-/// Many runs that differ in their starts, or in their parameters, of which only the ends are wanted.
+/// Many runs that differ in their starts, or in the parameters of their models, and of which only the ends are wanted.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -40,18 +40,23 @@ use tfe_runtime::{Element, Mixed, Model, Solve, State, Statistics};
 /// ```
 ///
 /// # How it runs
-/// With the feature `parallel` trajectories are shared among all processors. With one model, on each of them eight run side by side
-/// in vector instructions ([`Bundle`]), if the model has no constraints and the element no more than sixteen points, and of a Hamiltonian that is not M q̈ = f if it is a
-/// two-field element; all others run one after the other. Parameter sets ([`of_models`](Self::of_models)) go side by side, too: each lane computes with the parameters of its own model.
-/// Those of hand-written models that do not number their [parameters](Model::parameters) run one after the other, and so do those that differ in a `usize` or in the numbers of a `Vec`, which have
-/// no number in models of fixed size.
+/// With the feature `parallel` the trajectories are shared among all processors. On each processor, eight trajectories
+/// of a model of fixed size run side by side in vector registers ([`Bundle`]), if the model has no constraints and the
+/// element at most sixteen points; for a Hamiltonian whose equations are not M q̈ = f, the element must be a two-field
+/// one. All others run one after the other.
 ///
-/// Runs of models of run-time length go one by one, on all processors.
+/// Parameter sets ([`of_models`](Self::of_models)) run side by side, too: each lane computes with the parameters of
+/// its own model. They run one after the other if they are hand-written models that do not number their
+/// [parameters](Model::parameters), or if they differ in a `usize` or in the numbers of a `Vec`, which have no number
+/// in models of fixed size.
 ///
-/// Results depend neither on the number of processors nor on the order or number of the other starts, not by one bit. From a
-/// [`Simulation`](crate::Simulation) of one start they differ by rounding, if at all.
+/// Runs of models of run-time length are made one by one, on all processors.
 ///
-/// Defaults are those of `Simulation`: `Mixed::<4>` (order 6), a thousandth of the span as step, iteration to round-off.
+/// No bit of a result depends on the number of processors, or on the order or number of the other starts. Compared
+/// with a [`Simulation`](crate::Simulation) of the same start, results may differ by rounding.
+///
+/// Defaults are those of `Simulation`: element `Mixed::<4>` (order 6), one thousandth of the span as step size,
+/// iteration up to rounding.
 #[derive(Debug)]
 pub struct Ensemble<'m, M: 'm, const N: usize, K = OneModel<'m, M>, L: Length<N> = FixedLength> {
     pub(super) models: K,
@@ -79,7 +84,7 @@ impl<'m, M, const N: usize, L: Length<N>> Ensemble<'m, M, N, OneModel<'m, M>, L>
 where
     M: Declared<N, Length = L> + Sync,
 {
-    /// Runs of one model from many starts.
+    /// An ensemble of runs of one model from many starts.
     pub fn new(model: &'m M) -> Self {
         Self::with(OneModel(model))
     }
@@ -89,7 +94,7 @@ impl<'m, M, const N: usize, L: Length<N>> Ensemble<'m, M, N, ManyModels<'m, M>, 
 where
     M: Declared<N, Length = L> + Sync,
 {
-    /// Runs of many models of one kind: parameter sets, with one start for each or one for all.
+    /// An ensemble of runs of many models of one type (parameter sets), with one start for each or one for all.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -128,51 +133,56 @@ impl<M, const N: usize, K, L: Length<N>> Ensemble<'_, M, N, K, L> {
         }
     }
 
-    /// The element: `Mixed::<6>`, `Radau::<3>`, `Element::mixed(n)`, …
+    /// Sets the element: `Mixed::<6>`, `Radau::<3>`, `Element::mixed(n)`, …
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = element.into();
         self
     }
 
-    /// The step h, in the units of time. Where the span is no whole number of steps the last one is shorter.
+    /// Sets the step size h, in units of time. Where the span is not a whole number of steps, the last step is
+    /// shorter.
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
         self
     }
 
-    /// What the iteration inside an element may leave, relative to the state. It is judged by the rest of the geometric series of its increments, a fixed point by a 64th of that. Elements of a
-    /// run leave errors of the same sign, so that they add up; below some 1e-15 all values do the same, since roundings end the iteration. The default iterates to round-off.
+    /// Sets the tolerance of the iteration inside an element, relative to the state, as
+    /// [`Simulation::tolerance`](crate::Simulation::tolerance) does. The default iterates until only rounding errors
+    /// are left.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
         self
     }
 
-    /// The most iterations an element may take before its run stops with an error.
+    /// Sets the largest number of iterations in one element; if an element needs more, its run stops with an error.
     #[must_use]
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.control.max_iterations = iterations;
         self
     }
 
-    /// How the element's equations are solved; `Solve::Auto` by default. `Solve::Newton` runs one trajectory after the other.
+    /// Sets how the equations of an element are solved; `Solve::Auto` by default. With `Solve::Newton`, trajectories
+    /// run one after the other.
     #[must_use]
     pub fn solver(mut self, solve: Solve) -> Self {
         self.control.solve = solve;
         self
     }
 
-    /// Makes an element end at `time`: where a force jumps, an element across the jump would lose its order.
+    /// Makes an element end at `time`. Use it where a force jumps at a known time: an element across the jump would
+    /// lose its order of accuracy.
     #[must_use]
     pub fn break_at(mut self, time: f64) -> Self {
         self.breaks.push(time);
         self
     }
 
-    /// Whether steps are cut where a force has a kink or a jump, as by [`Simulation::at_kinks`](crate::Simulation::at_kinks). Runs of models with kinks are made one by one then, on all
-    /// processors; a motion that would slide along a jump is the failure of its run.
+    /// Sets whether steps end where a force has a kink or a jump, as
+    /// [`Simulation::at_kinks`](crate::Simulation::at_kinks) does. Runs of models with kinks are then made one by one,
+    /// on all processors; a motion that would slide along a jump fails its own run.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -217,12 +227,12 @@ where
         !self.events.is_empty() || (self.at_kinks && const { !M::FACTS.smooth })
     }
 
-    /// Runs all trajectories over the span, backwards where it ends before it starts. Each result is the node at the end, or why its run
-    /// stopped; a failure stops no other run.
+    /// Runs all trajectories over the span, backwards in time if it ends before it starts. Each result is the node at
+    /// the end, or the error of that run; a failure does not stop other runs.
     ///
     /// # Errors
-    /// [`EnsembleError`] where nothing can run: the element does not exist, step or span are not finite, the number of starts is not that of
-    /// models. A bad start is a failure of its own run only.
+    /// [`EnsembleError`] if nothing can run: the element does not exist, the step size or the span is not finite, or
+    /// the number of starts does not fit the number of models. An invalid start fails its own run only.
     pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
         let count = self.models.count(starts.len())?;
         let results = Mutex::new(Results::new(count));
@@ -235,10 +245,11 @@ where
         Ok(unlock(results).into_ends(statistics))
     }
 
-    /// Runs all trajectories and hands over each result, with the index of its run, as soon as it is known: in no particular order, and with
-    /// the feature `parallel` from several threads. For results that are too many to keep, or to be seen while others still run.
+    /// Runs all trajectories, and hands over each result with the index of its run as soon as it is known: in no
+    /// particular order, and with the feature `parallel` from several threads. Use it for results that are too many to
+    /// keep, or that are wanted while other runs continue.
     ///
-    /// Returns what all runs together have cost.
+    /// Returns the cost of all runs together.
     ///
     /// # Errors
     /// As from [`run`](Self::run).

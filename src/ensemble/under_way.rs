@@ -18,9 +18,10 @@ use std::sync::Mutex;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::{Model, State};
 
-/// An ensemble under way: made by [`Ensemble::begin`], moved by [`run_to`](Self::run_to).
+/// An ensemble that is advanced in parts: made by [`Ensemble::begin`], advanced by [`run_to`](Self::run_to).
 ///
-/// It holds the memory of a stepper for each trajectory, or of a [`Bundle`](tfe_runtime::bundle::Bundle) for eight: some kilobytes each for a few coordinates. A clone is a checkpoint.
+/// It holds the memory of a stepper for each trajectory, or of a [`Bundle`](tfe_runtime::bundle::Bundle) for eight of
+/// them: some kilobytes each for a few coordinates. A clone is a checkpoint.
 pub struct EnsembleRun<
     'm,
     M: 'm,
@@ -66,7 +67,8 @@ where
     M: Model<N> + Sync,
     K: Members<'m, M, N>,
 {
-    /// Places all trajectories at their starts, at the time `t0`; [`EnsembleRun::run_to`] moves them. For results at several times, as one run would pass them to the bit:
+    /// Places all trajectories at their starts, at the time `t0`; [`EnsembleRun::run_to`] advances them. Use it for
+    /// results at several times, which have the same bits as in one run:
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -88,7 +90,8 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`EnsembleError`] where the element does not exist, or the number of starts is not that of models. A bad start is a failure of its own run only.
+    /// [`EnsembleError`] if the element does not exist, or the number of starts does not fit the number of models. An
+    /// invalid start fails its own run only.
     pub fn begin(
         &self,
         starts: &[State<N>],
@@ -113,7 +116,8 @@ where
     M: family::Model + Sync,
     K: Models<'m, M>,
 {
-    /// Places all trajectories at their starts, at the time `t0`; [`EnsembleRun::run_to`] moves them. For results at several times, as one run would pass them to the bit.
+    /// Places all trajectories at their starts, at the time `t0`; [`EnsembleRun::run_to`] advances them. Use it for
+    /// results at several times, which have the same bits as in one run:
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -135,7 +139,8 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`EnsembleError`] where the element does not exist, or the number of starts is not that of models. A bad start is a failure of its own run only.
+    /// [`EnsembleError`] if the element does not exist, or the number of starts does not fit the number of models. An
+    /// invalid start fails its own run only.
     pub fn begin(
         &self,
         starts: &[FamilyState],
@@ -208,14 +213,16 @@ where
         self.reached.time
     }
 
-    /// Runs all trajectories on to the time `end`. What has failed stays so, and what an event has stopped stays at that event. A run whose events have [set](crate::Act::Set) parameters
-    /// does not go on from there: its next result is [`RunErrorKind::Unsupported`].
+    /// Continues all trajectories to the time `end`. A run that has failed keeps its error, and one that an event has
+    /// stopped stays at that event. A run whose events have [set](crate::Act::Set) parameters cannot be continued: its
+    /// next result is [`RunErrorKind::Unsupported`].
     ///
-    /// Where that time lies on the grid of steps from the first start, and the last one did, the results are to the last bit those of one run; else the grid begins anew where the
-    /// ensemble is. Without a step of one's own it is a thousandth of the first span.
+    /// If `end` lies on the grid of steps that begins at the first start, and the previous end did, the results have
+    /// the same bits as in one run; otherwise the grid begins anew at the time reached. If no step size was set, it is
+    /// one thousandth of the first span.
     ///
     /// # Errors
-    /// [`EnsembleError`] where step or span are not finite; nothing is changed then.
+    /// [`EnsembleError`] if the step size or the span is not finite; nothing is changed then.
     pub fn run_to(&mut self, end: f64) -> Result<Ends<N, L>, EnsembleError> {
         let Self {
             ensemble,

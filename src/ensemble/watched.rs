@@ -16,7 +16,8 @@ where
     M: Settable<'m, N, L>,
     L: Length<N>,
 {
-    /// Does `act` at events of every run, as [`Simulation::on`]. Runs are made one by one then, on all processors; a run that an event stops ends there, with the node at the event.
+    /// Calls `act` at events of every run, as [`Simulation::on`] does. Runs are then made one by one, on all
+    /// processors; a run that an event stops ends there, with the node at the event.
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -6,36 +6,37 @@ use nalgebra::{Complex, DMatrix, DVector};
 use std::error::Error;
 use std::fmt;
 
-/// An eigenvalue of largest modulus, as an iteration found it.
+/// The eigenvalue of largest modulus of an operator, as found by iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dominant {
-    /// The eigenvalue, of a complex pair the one with positive imaginary part.
+    /// The eigenvalue; of a complex pair, the one with positive imaginary part.
     pub eigenvalue: Complex<f64>,
-    /// ‖A X − X B‖ with an orthonormal X of one column, or two for a complex pair, and the eigenvalue in B: it is exact for an operator that differs
-    /// from A by so much.
+    /// The residual ‖A X − X B‖, with an orthonormal X of one column, or two for a complex pair, and the eigenvalue in
+    /// B: the eigenvalue is exact for an operator that differs from A by this much.
     pub residual: f64,
-    /// How often the operator was applied.
+    /// The number of products with the operator.
     pub products: usize,
 }
 
 impl Dominant {
-    /// |λ|
+    /// The modulus |λ|: the spectral radius of the operator.
     pub fn radius(&self) -> f64 {
         self.eigenvalue.norm()
     }
 }
 
-/// Why an eigenvalue of largest modulus was not found.
+/// Why the eigenvalue of largest modulus was not found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum DominantError {
-    /// The operator has no rows.
+    /// The operator has size zero.
     Empty,
-    /// A product is not finite.
+    /// A product with the operator is not finite.
     NotFinite,
     /// The eigenvalues of a small projected matrix did not converge.
     Projected,
-    /// No eigenvalue converged: as it is where many have the same modulus, those of a step that conserves energy about a stable equilibrium.
+    /// No eigenvalue converged, for example because many have the same modulus, as for a step that conserves energy
+    /// about a stable equilibrium.
     NotConverged {
         /// The best value so far.
         best: Dominant,
@@ -64,14 +65,14 @@ impl fmt::Display for DominantError {
 
 impl Error for DominantError {}
 
-/// How long an eigenvalue is iterated.
+/// The limits of the iteration for an eigenvalue.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Iteration {
-    /// The residual beside the modulus of the eigenvalue.
+    /// The residual at which the iteration ends, relative to the modulus of the eigenvalue.
     pub tolerance: f64,
-    /// The most products.
+    /// The largest number of products.
     pub products: usize,
-    /// The vectors that are kept orthogonal: memory is that of so many vectors. At least 6.
+    /// The number of orthogonal vectors kept, which determines the memory; at least 6.
     pub vectors: usize,
 }
 
@@ -86,15 +87,17 @@ impl Default for Iteration {
     }
 }
 
-/// The eigenvalue of largest modulus of an operator on `size` numbers, told by its products: `apply` writes A x for x.
+/// The eigenvalue of largest modulus of a linear operator A on `size` numbers that is given by its products: `apply`
+/// receives x and writes A x.
 ///
-/// Arnoldi's method with thick restarts: an orthonormal basis of a Krylov space, the Schur form of the projection on it, restarted with the half that
-/// belongs to the largest eigenvalues.
+/// The method is Arnoldi's with thick restarts: an orthonormal basis of a Krylov space and the Schur form of the
+/// projection on it, restarted with the half that belongs to the largest eigenvalues.
 ///
 /// # Not guaranteed
-/// That no eigenvalue is larger: one that the start vector (pseudo-random, always the same) does not hold is not seen. Moduli that nearly agree
-/// separate slowly: with a gap g beside the largest some g^(−½) products at best. About a stable equilibrium all eigenvalues of a symplectic step
-/// have modulus one, and there is nothing to converge to but an eigenvalue that lies apart on the circle.
+/// That no eigenvalue is larger: one that the start vector (pseudo-random, always the same) does not contain is not
+/// found. Eigenvalues of nearly equal modulus converge slowly: with a relative gap g after the largest, some g^(−½)
+/// products at best. About a stable equilibrium, all eigenvalues of a symplectic step have modulus one, and the
+/// iteration can converge only to one that is separated from the others on the unit circle.
 /// # Errors
 /// [`DominantError`]; [`NotConverged`](DominantError::NotConverged) holds the best value and its residual.
 /// # Reference

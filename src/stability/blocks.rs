@@ -2,14 +2,15 @@
 
 use nalgebra::{DMatrix, DMatrixView};
 
-/// The blocks of a transition or monodromy matrix by their names, so that nobody has to remember that rows and columns are ordered (p, q):
+/// Names for the four blocks of a transition matrix or monodromy matrix, whose rows and columns are ordered (p, q):
 ///
 /// ```text
 /// A = [ ∂p₁/∂p₀   ∂p₁/∂q₀ ]
 ///     [ ∂q₁/∂p₀   ∂q₁/∂q₀ ]                                                                (docs/theory.md, transition matrices)
 /// ```
 ///
-/// Each is N × N of a matrix of 2N × 2N, a view without a copy. Derivatives by velocities at the start are those by momenta times the mass matrix: ∂q₁/∂v₀ = ∂q₁/∂p₀ M.
+/// Each block is N × N, for a matrix of 2N × 2N, and a view without a copy. Derivatives with respect to initial
+/// velocities are those with respect to initial momenta times the mass matrix: ∂q₁/∂v₀ = ∂q₁/∂p₀ M.
 ///
 /// ```
 /// use tfe::prelude::*;

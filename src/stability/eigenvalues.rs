@@ -25,7 +25,7 @@ pub enum EigenvalueError {
         /// The column of the entry.
         column: usize,
     },
-    /// The QR iteration did not separate all eigenvalues.
+    /// The QR iteration did not converge for all eigenvalues.
     NoConvergence,
 }
 
@@ -51,20 +51,22 @@ impl Error for EigenvalueError {}
 /// Products of three entries between this and its inverse neither over- nor underflow.
 const MODERATE: f64 = 1e100;
 
-/// The eigenvalues of a square matrix: every λ with det(A − λ) = 0, as often as its multiplicity.
+/// The eigenvalues of a square matrix: every λ with det(A − λ) = 0, repeated according to its multiplicity.
 ///
-/// A matrix of two rows has a closed form,
+/// For a 2 × 2 matrix they have a closed form,
 ///
 /// ```text
 /// λ = (a₁₁ + a₂₂)/2 ± √(((a₁₁ − a₂₂)/2)² + a₁₂a₂₁) ,
 /// ```
 ///
-/// so that the eigenvalues of an oscillating symplectic map have modulus one to round-off. Larger ones are balanced, and reduced by
-/// double-shift QR sweeps: exact for a matrix that differs from the balanced one by some ε of its norm. The number of sweeps is limited.
+/// so that the eigenvalues of an oscillating symplectic map have modulus one up to rounding. Larger matrices are
+/// balanced and reduced by double-shift QR sweeps: the result is exact for a matrix that differs from the balanced one
+/// by some ε of its norm. The number of sweeps is limited.
 ///
 /// # Not guaranteed
-/// The order, except that complex pairs are adjacent and exact conjugates, positive imaginary part first. An eigenvalue of
-/// multiplicity r in one Jordan block is known to the r-th root of round-off only, and may come as a complex pair.
+/// The order, except that complex pairs are adjacent and exact conjugates, positive imaginary part first. An
+/// eigenvalue of multiplicity r in one Jordan block is accurate to the r-th root of the rounding unit only, and may
+/// come out as a complex pair.
 /// # Errors
 /// [`EigenvalueError`] for a matrix that is not square or not finite, and if the sweeps do not converge.
 /// # Reference

@@ -22,36 +22,39 @@ use nalgebra::DMatrix;
 use search::{Failure, Search, Withheld};
 use std::ops::Range;
 
-/// An interval of the parameter in which the spectral radius exceeds one.
+/// An interval of a parameter (such as the step size) in which the spectral radius exceeds one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnstableInterval {
-    /// Where it begins; the start of the range if it was unstable there already.
+    /// The start of the interval; the start of the range if it is unstable there already.
     pub start: f64,
-    /// Where it ends; the end of the range if it is unstable there still.
+    /// The end of the interval; the end of the range if it is still unstable there.
     pub end: f64,
-    /// The largest spectral radius inside; infinite at a pole of the matrix.
+    /// The largest spectral radius in the interval; infinite at a pole of the matrix.
     pub radius: f64,
-    /// Where the largest spectral radius is attained.
+    /// The parameter at which the largest spectral radius is attained.
     pub worst: f64,
 }
 
-/// Every interval of `range` in which the spectral radius of `matrix` exceeds one, ascending.
+/// All intervals of `range` in which the spectral radius of `matrix`, a function of one parameter, exceeds one; in
+/// ascending order.
 ///
-/// The matrix must be a smooth function of the parameter, as the transition matrix of an element is of its length; poles are allowed.
-/// The ends are found by root finding, in general to a relative accuracy of 10⁻¹² and as good as round-off in the matrix permits.
-/// Neighbouring intervals are reported as one. A radius that only touches one is no interval, nor is an excess ρ − 1 below 10⁻¹⁰, nor
-/// one that perturbations of the matrix by 256 ε (ε = 2.2·10⁻¹⁶, relative to the size of each entry nearby) could explain.
+/// The matrix must be a smooth function of the parameter, as the transition matrix of an element is of its length;
+/// poles are allowed. The ends of the intervals are found by root finding, in general to a relative accuracy of 10⁻¹²,
+/// or as far as rounding in the matrix permits. Adjacent intervals are reported as one. Not reported are a radius that
+/// only touches one, an excess ρ − 1 below 10⁻¹⁰, and an excess that perturbations of the matrix by 256 ε (ε =
+/// 2.2·10⁻¹⁶, relative to the size of each entry nearby) could explain.
 ///
 /// A range may begin at zero, where a transition matrix is the identity: the matrix is not evaluated there.
 ///
-/// About a thousand evaluations of the matrix for one or two modes over a few bubbles; tens of thousands for many modes that cross
-/// many times. More than 200 000 are an error.
+/// The cost is about a thousand evaluations of the matrix for one or two modes over a few bubbles, and tens of
+/// thousands for many modes that cross many times. More than 200 000 are an error.
 ///
 /// # Not guaranteed
-/// Modes that coincide for every parameter make ∏ (μᵢ − μⱼ)² vanish: a collision of other eigenvalues away from ±1 is then noticed
-/// only if one of some hundred samples falls into its interval.
+/// Modes that coincide for every parameter make ∏ (μᵢ − μⱼ)² vanish; a collision of other eigenvalues away from ±1 is
+/// then noticed only if one of some hundred samples falls into its interval.
 /// # Errors
-/// [`IntervalError`]: a range that is empty or not finite, a matrix that cannot be computed, or one that is not smooth.
+/// [`IntervalError`] for a range that is empty or not finite, a matrix that cannot be computed, or one that is not
+/// smooth.
 ///
 /// ```
 /// use nalgebra::DMatrix;
@@ -91,10 +94,12 @@ pub fn unstable_intervals_of<E>(
     })
 }
 
-/// Every parameter in `range` at which the spectral radius of `matrix` rises above one or returns to it, ascending.
+/// All parameters in `range` at which the spectral radius of `matrix` rises above one or returns to it, in ascending
+/// order.
 ///
-/// The limit speed of a spinning top is such a value, or the step at which an element loses its stability. Found by the method of
-/// [`unstable_intervals_of`], with the same conditions, tolerances and errors; ends of the range are not changes.
+/// Examples are the limit speed of a spinning top, or the step size at which an element loses its stability. The
+/// method, conditions, tolerances and errors are those of [`unstable_intervals_of`]; the ends of the range are not
+/// included.
 ///
 /// ```
 /// use nalgebra::DMatrix;

@@ -1,8 +1,9 @@
-//! A model frozen at a state.
+//! Models linearised about a state.
 //!
-//! With the second derivatives of H and the first ones of the generalized force held at their values at one (t, q, p), a model becomes
-//! linear with constant coefficients. Its exact flow over a time h has the eigenvalues e^{λh}; those of an element should be close to them.
-//! Where one is larger, and the model does not account for it, the step lies in an unstable interval of the linearised model.
+//! The second derivatives of H and the first derivatives of the generalized force are held at their values at one (t,
+//! q, p); the model then is linear with constant coefficients. Its exact flow over a time h has the eigenvalues
+//! e^{λh}, which those of an element should approximate. If one of the element's is larger than the model's own
+//! growth, the step size lies in an unstable interval of the linearised model.
 
 use super::eigenvalues::EigenvalueError;
 use super::time_scales::TimeScales;
@@ -13,13 +14,13 @@ use tfe_runtime::{
     CoordinateName, Element, Facts, First, Form, Model, Real, Second, State, legendre, transition,
 };
 
-/// Why there is no linear model about a state.
+/// Why a model cannot be linearised about a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LinearModelError {
-    /// Constraints act: second derivatives at a state say nothing about the motions that they allow.
+    /// The model has constraints: second derivatives at a state say nothing about the motions that these allow.
     Constrained,
-    /// The momentum belongs to no velocity.
+    /// No velocity belongs to the momentum at the state: the mass matrix is singular.
     NoVelocity,
     /// A second derivative is infinite or not a number.
     NotFinite,
@@ -39,15 +40,18 @@ impl fmt::Display for LinearModelError {
 
 impl Error for LinearModelError {}
 
-/// A model linearised about a state: its second derivatives held at their values there.
+/// A model linearised about a state, with its second derivatives held at their values there:
 ///
 /// ```text
 /// H = ½ pᵀH_pp p + pᵀH_pq q + ½ qᵀH_qq q ,     Q = Q_p p + Q_q q                                       (T-108)
 /// ```
 ///
-/// q and p are deviations from the state. About an equilibrium it is the model of small motions; elsewhere that of motions beside the one through the state, as long as
-/// that stays near. It is a model as any other, linear with constant coefficients, so that it steps by a matrix.
-/// `model(Name, truncated(2, …))` in `#[dynamics(…)]` declares the same where the state is known beforehand; `Simulation::run_linearised` linearises along a motion.
+/// q and p are deviations from the state. About an equilibrium this is the model of small motions; elsewhere it
+/// describes motions near the one through the state, for as long as that stays near the state. It is a model like any
+/// other, linear with constant coefficients, so that each step is a product with a matrix.
+///
+/// `model(Name, truncated(2, …))` in `#[dynamics(…)]` declares the same if the state is known beforehand;
+/// `Simulation::run_linearised` linearises along a motion.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -75,10 +79,10 @@ pub struct LinearModel<const N: usize> {
 }
 
 impl<const N: usize> LinearModel<N> {
-    /// The model as it is at `state`.
+    /// Linearises a model about `state` at a given time.
     ///
     /// # Errors
-    /// [`LinearModelError`]
+    /// [`LinearModelError`] for a model with constraints, a singular mass matrix, or derivatives that are not finite.
     pub fn about<M: Model<N>>(
         model: &M,
         t: f64,
@@ -110,10 +114,10 @@ impl<const N: usize> LinearModel<N> {
         Ok(Self { second })
     }
 
-    /// How fast it moves: the eigenvalues of its equations.
+    /// The time scales of the linear model: the eigenvalues of its equations of motion.
     ///
     /// # Errors
-    /// [`EigenvalueError`]
+    /// [`EigenvalueError`] if a coefficient is not finite or the eigenvalues do not converge.
     pub fn time_scales(&self) -> Result<TimeScales, EigenvalueError> {
         TimeScales::of(&self.generator())
     }

@@ -12,10 +12,12 @@ use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::path::Path;
 
-/// The spectral radius, or another number that says how unstable something is, over a rectangle of two parameters x and y.
+/// A stability map: the spectral radius, or another measure of instability, over a rectangle of two parameters x and
+/// y.
 ///
-/// The rectangle is divided into equal cells; the number of a cell is that at its centre. Column 0 is at the smallest x, row 0 at the smallest y.
-/// A cell whose number could not be computed has none: it is counted, the first one is kept with its error.
+/// The rectangle is divided into equal cells; the value of a cell is that at its centre. Column 0 is at the smallest
+/// x, row 0 at the smallest y. A cell whose value could not be computed has none; such cells are counted, and the
+/// first is kept with its error.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -53,7 +55,7 @@ pub struct StabilityMap<E> {
     first_failure: Option<PointFailure<E>>,
 }
 
-/// A map to be: which rectangle, how many cells. Made by [`StabilityMap::over`].
+/// The settings of a map: its rectangle, the number of cells, labels. Made by [`StabilityMap::over`].
 ///
 /// Defaults: 200 × 200 cells, labels “x” and “y”, no title, no progress, unstable above 1 + 10⁻⁶.
 #[derive(Clone, Debug)]
@@ -69,7 +71,7 @@ pub struct MapPlan {
 }
 
 impl StabilityMap<Infallible> {
-    /// A map over the rectangle of these ranges, edge to edge.
+    /// Begins a map over the rectangle of these ranges (the outer edges of the cells).
     pub fn over(x: Range<f64>, y: Range<f64>) -> MapPlan {
         MapPlan {
             x,
@@ -85,28 +87,29 @@ impl StabilityMap<Infallible> {
 }
 
 impl MapPlan {
-    /// How many cells in the directions of x and of y; at most 2²⁸ together.
+    /// Sets the number of cells in the directions of x and of y; at most 2²⁸ in all.
     #[must_use]
     pub fn resolution(mut self, columns: usize, rows: usize) -> Self {
         (self.columns, self.rows) = (columns, rows);
         self
     }
 
-    /// The names of the parameters in pictures and messages.
+    /// Sets the names of the parameters, for pictures and messages.
     #[must_use]
     pub fn labels(mut self, x: impl Into<String>, y: impl Into<String>) -> Self {
         self.labels = [x.into(), y.into()];
         self
     }
 
-    /// The title of pictures.
+    /// Sets the title of pictures.
     #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
     }
 
-    /// Above which number a cell is unstable. Not exactly 1 by default, because multipliers of modulus one that meet are split by the root of round-off.
+    /// Sets the value above which a cell counts as unstable; 1 + 10⁻⁶ by default. It is not exactly 1 because rounding
+    /// splits multipliers of modulus one that meet, by the square root of the rounding unit.
     #[must_use]
     pub fn limit(mut self, limit: f64) -> Self {
         self.limit = limit;
@@ -120,12 +123,14 @@ impl MapPlan {
         self
     }
 
-    /// Computes the number of every cell, on all processors with the feature `parallel`. The result does not depend on their number.
+    /// Computes the value of every cell, on all processors with the feature `parallel`. The result does not depend on
+    /// their number.
     ///
-    /// A number that is not finite is a failure, [`PointError::NotFinite`].
+    /// A cell whose value is not finite counts as failed, with [`PointError::NotFinite`].
     ///
     /// # Errors
-    /// [`MapError::Resolution`], [`MapError::Range`] for a plan that cannot be. Failures at points are part of the map.
+    /// [`MapError::Resolution`] or [`MapError::Range`] for an invalid number of cells or range. Failures of single
+    /// cells are part of the map.
     pub fn run<E, F>(&self, radius: F) -> Result<StabilityMap<E>, MapError>
     where
         E: Send,
@@ -262,27 +267,27 @@ impl<E> StabilityMap<E> {
         map
     }
 
-    /// Cells in the direction of x.
+    /// The number of cells in the direction of x.
     pub fn columns(&self) -> usize {
         self.plan.columns
     }
 
-    /// Cells in the direction of y.
+    /// The number of cells in the direction of y.
     pub fn rows(&self) -> usize {
         self.plan.rows
     }
 
-    /// x at the centres of the cells of a column.
+    /// The value of x at the centres of the cells of a column.
     pub fn x(&self, column: usize) -> f64 {
         self.plan.x_of(column)
     }
 
-    /// y at the centres of the cells of a row.
+    /// The value of y at the centres of the cells of a row.
     pub fn y(&self, row: usize) -> f64 {
         self.plan.y_of(row)
     }
 
-    /// The number of a cell; none where it failed, and outside the map.
+    /// The value of a cell; `None` if it failed or lies outside the map.
     pub fn value(&self, column: usize, row: usize) -> Option<f64> {
         if column >= self.columns() || row >= self.rows() {
             return None;
@@ -290,19 +295,21 @@ impl<E> StabilityMap<E> {
         self.values[row * self.columns() + column]
     }
 
-    /// The number of the cell in which the point (x, y) lies, which is that of its centre; none where it failed, and outside the map.
+    /// The value of the cell that contains the point (x, y), computed at its centre; `None` if it failed or the point
+    /// lies outside the map.
     pub fn radius_at(&self, x: f64, y: f64) -> Option<f64> {
         let column = cell(&self.plan.x, x, self.columns())?;
         let row = cell(&self.plan.y, y, self.rows())?;
         self.value(column, row)
     }
 
-    /// The largest number; none if all cells failed.
+    /// The largest value; `None` if all cells failed.
     pub fn largest(&self) -> Option<f64> {
         self.values.iter().flatten().copied().reduce(f64::max)
     }
 
-    /// The part of the cells with a number that is above the [limit](MapPlan::limit), from 0 to 1; none if all cells failed.
+    /// The fraction of unstable cells, those above the [limit](MapPlan::limit), among the cells with a value: from 0
+    /// to 1; `None` if all cells failed.
     pub fn fraction_unstable(&self) -> Option<f64> {
         let known = self.values.len() - self.failed;
         let is_unstable = |value: &&f64| **value > self.plan.limit;
@@ -310,21 +317,23 @@ impl<E> StabilityMap<E> {
         (known > 0).then(|| unstable as f64 / known as f64)
     }
 
-    /// How many cells have no number.
+    /// The number of cells without a value.
     pub fn failed(&self) -> usize {
         self.failed
     }
 
-    /// The first cell without a number, in the lowest row that has one.
+    /// The first cell without a value, counted from the lowest row.
     pub fn first_failure(&self) -> Option<&PointFailure<E>> {
         self.first_failure.as_ref()
     }
 
-    /// Writes the picture of [`StabilityMap::heat_map`] into a file `.svg`, its cells into a file `.png`, or the numbers (x, y, value) into a file `.csv`, where the
-    /// value of a failed cell is empty. Without the feature `charts` only `.csv`.
+    /// Writes a file: the picture of [`StabilityMap::heat_map`] as `.svg`, its cells as `.png`, or the values as
+    /// `.csv` with the columns x, y, value, where the value of a failed cell is empty. Without the feature `charts`
+    /// only `.csv`.
     ///
     /// # Errors
-    /// [`MapError::UnknownEnding`]; [`MapError::Io`]; [`MapError::Chart`] where there is no picture: if all cells failed.
+    /// [`MapError::UnknownEnding`] for another ending, [`MapError::Io`] if the file cannot be written,
+    /// [`MapError::Chart`] if there is no picture because all cells failed.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), MapError> {
         let path = path.as_ref();
         let is = |ending| {

@@ -6,11 +6,11 @@ use std::error::Error;
 use std::f64::consts::TAU;
 use std::fmt;
 
-/// Why the modes of a transition matrix were not found.
+/// Why the modes of a transition matrix could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ModeError {
-    /// The matrix has no eigenvalues that could be found.
+    /// The eigenvalues of the matrix could not be computed.
     Eigenvalues(EigenvalueError),
     /// The step is zero, infinite or not a number.
     Step {
@@ -45,23 +45,26 @@ impl Error for ModeError {
     }
 }
 
-/// How many eigenvalues a mode stands for.
+/// The number of eigenvalues that make a mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModeKind {
     /// One real eigenvalue.
     Real,
-    /// Two conjugate ones.
+    /// Two conjugate complex eigenvalues.
     Pair,
 }
 
-/// A real eigenvalue of a transition matrix, or a pair of conjugate ones, and what it means over the length h of the step.
+/// A mode of a transition matrix over the time h: a real eigenvalue λ or a conjugate pair, with its growth rate,
+/// frequency and damping ratio.
 ///
-/// With λ = e^{(σ + iω) h}: a motion in this mode alone is multiplied by e^{σt} and turns by ωt.
+/// With λ = e^{(σ + iω) h}, a motion in this mode alone is multiplied by e^{σt} in the time t, and its phase turns by
+/// ωt.
 ///
 /// # The frequency is ambiguous
-/// One matrix says where a motion is after h, not how often it went round in between: ω and ω + 2πk/h, k an integer, have the same λ. [`Mode::frequency`] is the
-/// principal one, at most π/h, which is the right one if the step is shorter than half a period of the mode. For a monodromy matrix, where h is a whole period of
-/// the coefficients, that is rarely so: see [`Mode::frequencies`].
+/// A matrix tells where a motion is after the time h, not how many turns it has made: ω and ω + 2πk/h, for any integer
+/// k, have the same λ. [`Mode::frequency`] is the principal value, at most π/h, and is the true one if the step is
+/// shorter than half a period of the mode. For a monodromy matrix, where h is a whole period of the coefficients, this
+/// is rarely so: see [`Mode::frequencies`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mode {
     multiplier: Complex<f64>,
@@ -70,22 +73,23 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// The eigenvalue λ; of a pair the one with positive imaginary part.
+    /// The eigenvalue λ; of a pair, the one with positive imaginary part.
     pub fn multiplier(&self) -> Complex<f64> {
         self.multiplier
     }
 
-    /// Whether it is one of a pair.
+    /// Whether the mode is a real eigenvalue or a conjugate pair.
     pub fn kind(&self) -> ModeKind {
         self.kind
     }
 
-    /// |λ|: by what a step multiplies the amplitude.
+    /// The modulus |λ|, by which a step multiplies the amplitude.
     pub fn modulus(&self) -> f64 {
         self.multiplier.norm()
     }
 
-    /// σ = ln |λ| / h, per unit of time, negative if the mode decays; −∞ for λ = 0 (+∞ if the step goes back in time).
+    /// The growth rate σ = ln |λ| / h, an inverse time, negative if the mode decays; −∞ for λ = 0 (+∞ if the step goes
+    /// back in time).
     pub fn growth_rate(&self) -> f64 {
         self.modulus().ln() / self.step
     }
@@ -112,8 +116,9 @@ impl Mode {
         (0..count).map(nth).collect()
     }
 
-    /// ζ = −σ/√(σ² + ω²) with the principal frequency: 1 for a mode that decays without oscillation, 0 for one that keeps its amplitude, negative for one that grows.
-    /// None for λ = 1, which does nothing, such as a motion of the whole system.
+    /// The damping ratio ζ = −σ/√(σ² + ω²), with the principal frequency: 1 for a mode that decays without
+    /// oscillation, 0 for one that keeps its amplitude, negative for one that grows. `None` for λ = 1, which neither
+    /// decays nor oscillates, such as a rigid-body motion.
     pub fn damping_ratio(&self) -> Option<f64> {
         let (sigma, omega) = (self.growth_rate(), self.frequency());
         if sigma.is_infinite() {
@@ -124,7 +129,8 @@ impl Mode {
     }
 }
 
-/// The modes of a transition matrix over a step h (or of a monodromy matrix over a period): ascending by frequency, then by modulus, pairs once.
+/// The modes of a transition matrix over a step h (or of a monodromy matrix over a period h), in the order of
+/// ascending frequency, then modulus; each conjugate pair is one mode.
 ///
 /// # Errors
 /// [`ModeError::Step`] for a step that is zero or not finite; otherwise those of [`eigenvalues()`].

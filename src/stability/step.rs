@@ -17,7 +17,8 @@ use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use tfe_runtime::length::RunTimeLength;
 
-/// How the transition matrix of models of one kind of length is found; what [`transition_matrix`](super::transition_matrix) asks for.
+/// How the transition matrix is computed for models of one kind of length; the interface behind
+/// [`transition_matrix`](super::transition_matrix).
 #[cfg_attr(
     not(feature = "sparse"),
     diagnostic::on_unimplemented(
@@ -95,19 +96,19 @@ impl<M: family::Model> Transitions<M, 0> for RunTimeLength {
     }
 }
 
-/// The transition matrix of one element of a model of run-time length as an operator, in memory and time linear in its length: the derivative of the
-/// step map (p, q) ↦ (p, q) at `state`.
+/// The transition matrix of one element of a model of run-time length, as an operator whose memory and time are linear
+/// in the length of the model: the derivative of the step map (p, q) ↦ (p, q) at `state`.
 ///
 /// ```text
 /// (δp₁, δq₁) = A (δp₀, δq₀)                                                                             (theory.md (T-30))
 /// ```
 ///
-/// The kinetic energy may be any of a Lagrangian, with constraints, too (theory.md (T-160)); that of a Hamiltonian has to be ½ Σ p²/m.
+/// A Lagrangian may have any kinetic energy and constraints (theory.md (T-160)); a Hamiltonian must have ½ Σ p²/m.
 ///
 /// # Shapes
 /// 2n numbers, ordered (p, q).
 /// # Errors
-/// [`family::OperatorError`] where a step is impossible or fails.
+/// [`family::OperatorError`] if the model or the step is invalid, or the step cannot be solved.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -136,15 +137,16 @@ pub fn transition<M: family::Model>(
     family::TransitionOperator::of_step(model, element.into(), state, t, h)
 }
 
-/// The eigenvalue of largest modulus of a step, by [`dominant_of`]: its modulus is the spectral radius.
+/// The eigenvalue of largest modulus of a step, by [`dominant_of`]; its modulus is the spectral radius.
 ///
-/// Momenta are first scaled by one number, which two products tell, to be as large as coordinates; the residual is that in the scaled numbers.
+/// The momenta are first scaled by one number, determined from two products, to the size of the coordinates; the
+/// residual is that of the scaled problem.
 ///
 /// # Not guaranteed
-/// As for [`dominant_of`]. About a stable equilibrium a symplectic step has many eigenvalues of modulus one and no other: then this is an error that
-/// holds the best value, or one of those eigenvalues; how good it is says the residual.
+/// As for [`dominant_of`]. About a stable equilibrium, all eigenvalues of a symplectic step have modulus one: the
+/// result is then an error that holds the best value, or one of those eigenvalues; the residual says how good it is.
 /// # Errors
-/// [`DominantError`]
+/// [`DominantError`] if no eigenvalue converges or a product is not finite.
 #[cfg(feature = "sparse")]
 pub fn dominant(
     transition: &family::TransitionOperator,

@@ -7,7 +7,8 @@ use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 use std::fmt;
 
-/// The rates λ of a linear model, whose motions are sums of e^{λt}: whether it is stiff, and what steps see of it.
+/// The time scales of a linear model whose motions are sums of e^{λt}: its rates λ, its stiffness, and the step size
+/// beyond which elements need Newton's method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeScales {
     rates: Vec<Complex<f64>>,
@@ -39,25 +40,26 @@ impl TimeScales {
         Ok(Self { rates, free })
     }
 
-    /// All λ.
+    /// All rates λ (eigenvalues of the equations of motion), complex, inverse times.
     pub fn rates(&self) -> &[Complex<f64>] {
         &self.rates
     }
 
-    /// The largest |λ|, in radians per unit of time; zero if nothing moves.
+    /// The largest |λ|, in radians per unit of time; zero if all are zero.
     pub fn fastest(&self) -> f64 {
         self.rates.iter().map(|rate| rate.norm()).fold(0.0, larger)
     }
 
-    /// The smallest |λ| that is not zero; zero if all are. By rounding those of free coordinates are some 10⁻⁸ of the largest: rates below 10⁻⁷ of it count as zero, unless
-    /// perturbations of the size of roundings leave them as they are.
+    /// The smallest nonzero |λ|, in radians per unit of time; zero if all are zero. Rounding gives free coordinates
+    /// rates of about 10⁻⁸ of the largest: rates below 10⁻⁷ of the largest therefore count as zero, unless
+    /// perturbations of the size of rounding errors leave them unchanged.
     pub fn slowest(&self) -> f64 {
         let sizes = self.rates.iter().map(|rate| rate.norm());
         let moving = sizes.filter(|size| *size > self.free);
         moving.reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// fastest/slowest; one if nothing moves.
+    /// The stiffness ratio fastest/slowest; one if all rates are zero.
     pub fn stiffness(&self) -> f64 {
         if self.slowest() == 0.0 {
             1.0
@@ -66,7 +68,8 @@ impl TimeScales {
         }
     }
 
-    /// The step from which on Newton's method has to solve the elements: longer ones do not contract as a fixed point, 2/|λ|.
+    /// The step size 2/|λ| of the fastest rate beyond which the fixed-point iteration of elements does not converge,
+    /// so that Newton's method is needed.
     pub fn newton_from(&self) -> f64 {
         2.0 / self.fastest()
     }

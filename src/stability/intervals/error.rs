@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::fmt;
 
-/// Why the unstable intervals could not be found.
+/// Why unstable intervals could not be found.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum IntervalError<E> {
@@ -21,7 +21,7 @@ pub enum IntervalError<E> {
         /// Why.
         source: E,
     },
-    /// The matrix is empty, not square, or not of the size it had elsewhere.
+    /// The matrix is empty, not square, or differs in size from the matrix at other parameters.
     Shape {
         /// The parameter.
         at: f64,
@@ -40,7 +40,8 @@ pub enum IntervalError<E> {
         /// The parameter.
         at: f64,
     },
-    /// The matrix is not smooth enough in the parameter: its functions were still unresolved after very many evaluations.
+    /// The matrix is not smooth enough in the parameter: it was still not resolved after the largest number of
+    /// evaluations.
     Unresolved {
         /// Where the last evaluation was.
         near: f64,

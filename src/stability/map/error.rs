@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{ElementError, StepError};
 
-/// Why there is no map, or no file of it.
+/// Why a stability map, or a file of it, could not be made.
 #[derive(Debug)]
 #[non_exhaustive]
 pub enum MapError {
@@ -29,9 +29,9 @@ pub enum MapError {
         /// The end asked for.
         end: f64,
     },
-    /// The element does not exist (number of nodes, quadrature).
+    /// The element does not exist: an impossible number of nodes, or a quadrature that this family does not have.
     Element(ElementError),
-    /// The period is not positive and finite, or divided into no elements.
+    /// The period is not positive and finite, or the number of elements is zero.
     Period {
         /// The period asked for.
         period: f64,
@@ -45,7 +45,7 @@ pub enum MapError {
         /// What the file system said.
         source: io::Error,
     },
-    /// The ending of the file name is none that can be written.
+    /// The ending of the file name is not one of the supported formats.
     UnknownEnding {
         /// Which file.
         path: PathBuf,
@@ -113,30 +113,30 @@ impl Error for MapError {
     }
 }
 
-/// A cell without a number: where, and why.
+/// A cell without a value: where, and why.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointFailure<E> {
     /// Its column, from 0 at the smallest x.
     pub column: usize,
     /// Its row, from 0 at the smallest y.
     pub row: usize,
-    /// x at its centre.
+    /// x at the centre of the cell.
     pub x: f64,
-    /// y at its centre.
+    /// y at the centre of the cell.
     pub y: f64,
-    /// Why.
+    /// Why there is no value.
     pub error: PointError<E>,
 }
 
-/// Why a cell has no number.
+/// Why a cell has no value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PointError<E> {
-    /// The number is infinite or not a number.
+    /// The value is infinite or not a number.
     NotFinite {
         /// What it is.
         value: f64,
     },
-    /// It could not be computed.
+    /// The value could not be computed.
     Failed(E),
 }
 
@@ -171,7 +171,7 @@ impl<E: Error + 'static> Error for PointFailure<E> {
     }
 }
 
-/// Why a model has no Floquet multipliers about rest.
+/// Why the Floquet multipliers of a model about its rest state could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum FloquetError {
@@ -189,14 +189,14 @@ pub enum FloquetError {
         /// Why.
         source: TransitionError,
     },
-    /// Rest, q = 0 and p = 0, is no motion of the model: an element moved it.
+    /// The rest state q = 0, p = 0 is not an equilibrium of the model: an element moved away from it.
     NotAtRest {
         /// The number of the element in the period, from 0.
         element: usize,
         /// The largest coordinate or momentum after it.
         distance: f64,
     },
-    /// The monodromy matrix has no eigenvalues that could be found.
+    /// The eigenvalues of the monodromy matrix could not be computed.
     Eigenvalues(EigenvalueError),
 }
 

@@ -10,20 +10,25 @@ use tfe_runtime::workspace::{Workspace, numbers_len, pivots_len, transition_len}
 use tfe_runtime::{Element, Model, State, StepError};
 
 impl MapPlan {
-    /// The map of the largest modulus of a Floquet multiplier of models about rest, q = 0 and p = 0: above one rest is unstable.
+    /// The map of the largest modulus of the Floquet multipliers about the rest state q = 0, p = 0; rest is unstable
+    /// where it is greater than one (as in the Ince–Strutt diagram of Mathieu's equation).
     ///
-    /// `model` makes the model of a point (x, y), whose coefficients have the period T. With A_k the transition matrix of the k-th of the elements of length
-    /// T/`elements`, the multipliers are the eigenvalues λ of the monodromy matrix,
+    /// `model` makes the model for a point (x, y); its coefficients have the period T. With A_k the transition matrix
+    /// of the k-th of the elements, each of length T/`elements`, the multipliers are the eigenvalues λ of the
+    /// monodromy matrix,
     ///
     /// ```text
     /// Φ = A_K … A_2 A_1 ,     ρ = max |λ(Φ)| .                    (theory.md, transition matrices)
     /// ```
     ///
-    /// A model without a period has any: ρ is then e^{σT}, σ the largest growth rate. Rest must be a motion of the model; where a force moves it, the point fails with
-    /// [`FloquetError::NotAtRest`]. Where Φ has an entry beyond 10³⁰⁸ the point fails with [`FloquetError::Eigenvalues`].
+    /// For a model whose coefficients are constant, any T will do: ρ is then e^{σT}, with σ the largest growth rate.
+    /// Rest must be an equilibrium of the model; if a force moves it, the point fails with
+    /// [`FloquetError::NotAtRest`]. If Φ has an entry beyond 10³⁰⁸, the point fails with
+    /// [`FloquetError::Eigenvalues`].
     ///
     /// # Errors
-    /// [`MapError::Element`], [`MapError::Period`] and those of [`MapPlan::run`].
+    /// [`MapError::Element`] or [`MapError::Period`] for an element or a period that is invalid, and those of
+    /// [`MapPlan::run`].
     ///
     /// ```
     /// use tfe::prelude::*;

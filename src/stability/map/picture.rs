@@ -4,15 +4,17 @@ use super::StabilityMap;
 use crate::charts::{Axis, Class, Colour, HeatMap, Scale};
 
 impl<E> StabilityMap<E> {
-    /// The map as a picture of the numbers, to which curves can be added. Colours begin at the [limit](super::MapPlan::limit) if anything is above it, so that all
-    /// stable cells are dark blue; failed cells are grey. The scale is logarithmic unless a number is zero or negative.
+    /// The map as a picture with colours for the values, to which curves can be added. Colours begin at the
+    /// [limit](super::MapPlan::limit) if a value is above it, so that all stable cells are dark blue; failed cells are
+    /// grey. The scale is logarithmic unless a value is zero or negative.
     pub fn heat_map(&self) -> HeatMap {
         let size = (self.columns(), self.rows());
         let map = HeatMap::new(&self.plan.title, size, |i, j| self.value(i, j));
         self.with_axes(map.values(self.colours()))
     }
 
-    /// The map as a picture of two classes: “stable” in white, “unstable”, above the [limit](super::MapPlan::limit), in blue.
+    /// The map as a picture of two classes: “stable” in white, and “unstable”, above the
+    /// [limit](super::MapPlan::limit), in blue.
     ///
     /// ```
     /// use tfe::stability::StabilityMap;
