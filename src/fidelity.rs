@@ -1,4 +1,4 @@
-//! A ladder of models of one scene: which of them, with which element and step, is just good enough.
+//! Model comparison: which of several models of one scene, with which element and step size, is just accurate enough.
 
 mod error;
 mod ladder;
@@ -22,17 +22,19 @@ use truth::Truth;
 pub use error::FidelityError;
 pub use ladder::{Choice, Ladder, Rung, RungPoint};
 
-/// Runs several models of one scene, and finds the cheapest that tells the scene's outputs with an accuracy.
+/// Runs several models of one scene, and finds the cheapest that computes the scene's outputs with a given accuracy.
 ///
-/// The models, the rungs, begin at what is the same start in the coordinates of each; they may differ in the number of coordinates and in kind, of
-/// fixed size or of run-time length. The last rung is the truth. What is compared are outputs, `output(name) = …`, that all rungs declare:
+/// The models are called rungs, the result a ladder. All models begin at the same start, expressed in the coordinates
+/// of each; they may differ in their coordinates and their kind of length. The last rung is taken as the truth.
+/// Compared are the outputs, `output(name) = …`, that all models declare:
 ///
 /// ```text
 /// error = max |y(t) − y_ref(t)| / max |y_ref(t)|      over all outputs y, at the ends of equal parts of the span        (T-110)
 /// ```
 ///
-/// the second maximum of each output by itself over the same times; absolute for an output that is zero at all of them. Each rung is run with each element
-/// and with steps halved from a part of the span, until its error falls no more: what is left then is the error of the model, or of roundings.
+/// where the second maximum is taken over the same times for each output separately; the error is absolute for an
+/// output that is zero at all of them. Each model is run with each element and with step sizes halved from a part of
+/// the span, until its error no longer falls: what is left is the error of the model, or of rounding.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -75,10 +77,13 @@ pub use ladder::{Choice, Ladder, Rung, RungPoint};
 /// # }
 /// ```
 ///
-/// Times are those of the steps alone, on one processor, the best of several repetitions where a run is short, as in
-/// [`WorkPrecision`](crate::WorkPrecision); nothing inside elements is asked for, so linear models of fixed size step by a matrix where that pays, as they do with
-/// [`record_every`](crate::Simulation::record_every). The reference is a run of the last rung with `Mixed::<9>`, by steps that are never cut, whose length is halved until two runs agree to a
-/// tenth of the smallest accuracy or approach no more; accuracies below twice its uncertainty are not known, and nothing is chosen for them.
+/// Times are those of the steps alone, on one processor, the best of several repetitions if a run is short, as in
+/// [`WorkPrecision`](crate::WorkPrecision). Nothing inside elements is recorded, so that linear models of fixed size
+/// step by a matrix product where that is cheaper, as they do with [`record_every`](crate::Simulation::record_every).
+///
+/// The reference is a run of the last rung with `Mixed::<9>`, by steps that are never cut and whose size is halved
+/// until two runs agree to a tenth of the smallest accuracy or no longer approach each other. No choice is made for
+/// accuracies below twice the uncertainty of the reference.
 pub struct Fidelity<'m> {
     span: Range<f64>,
     title: String,
@@ -94,7 +99,7 @@ pub struct Fidelity<'m> {
 }
 
 impl<'m> Fidelity<'m> {
-    /// A ladder over the span, backwards where it ends before it starts; no rung so far.
+    /// A comparison over the span, backwards in time if it ends before it starts; as yet without models.
     pub fn new(span: Range<f64>) -> Self {
         Self {
             span,
@@ -111,7 +116,8 @@ impl<'m> Fidelity<'m> {
         }
     }
 
-    /// Adds a model with its start. The last one added is the truth that the others are compared with, and a candidate as they are.
+    /// Adds a model (a rung) with its start. The last one added is the truth with which the others are compared, and
+    /// is itself a candidate.
     #[must_use]
     pub fn rung<M: Subject<S>, S: PhasePoint + 'm>(
         mut self,
@@ -124,64 +130,66 @@ impl<'m> Fidelity<'m> {
         self
     }
 
-    /// The outputs that count; those that all rungs declare where this is not called. One site of an array is `"strain[3]"`.
+    /// Sets the outputs to compare; by default those that all models declare. One site of an array is `"strain[3]"`.
     #[must_use]
     pub fn outputs<N: Into<String>>(mut self, names: impl IntoIterator<Item = N>) -> Self {
         self.outputs = Some(names.into_iter().map(Into::into).collect());
         self
     }
 
-    /// The elements that are tried: `Mixed` of 3, 5 and 9 nodes by default.
+    /// Sets the elements to try: `Mixed` of 3, 5 and 9 nodes by default.
     #[must_use]
     pub fn elements(mut self, elements: impl IntoIterator<Item = Element>) -> Self {
         self.elements = elements.into_iter().collect();
         self
     }
 
-    /// The accuracies for which a choice is shown: 10⁻¹, 10⁻², … 10⁻¹⁰ by default. Runs go no further than the smallest asks for;
-    /// [`Ladder::cheapest`] takes any.
+    /// Sets the accuracies for which the result shows a choice: 10⁻¹, 10⁻², … 10⁻¹⁰ by default. Step sizes are not
+    /// refined beyond the smallest of them; [`Ladder::cheapest`] takes any accuracy.
     #[must_use]
     pub fn accuracies(mut self, accuracies: impl IntoIterator<Item = f64>) -> Self {
         self.accuracies = accuracies.into_iter().collect();
         self
     }
 
-    /// At the ends of how many equal parts of the span outputs are compared, besides its start: 16 by default. No step is longer than a part.
+    /// Sets the number of equal parts of the span at whose ends (and at its start) outputs are compared: 16 by
+    /// default. No step is longer than a part.
     #[must_use]
     pub fn parts(mut self, parts: usize) -> Self {
         self.parts = parts;
         self
     }
 
-    /// The most steps of a run: 131 072 by default.
+    /// Sets the largest number of steps of a run: 131 072 by default.
     #[must_use]
     pub fn most_steps(mut self, steps: usize) -> Self {
         self.most_steps = steps;
         self
     }
 
-    /// For how long a run is repeated, for its best time: 20 ms by default. One that takes longer is done once.
+    /// Sets for how long a run is repeated to find its best time: 20 ms by default. A run that takes longer is made
+    /// once.
     #[must_use]
     pub fn repeat_for(mut self, duration: Duration) -> Self {
         self.repeat_for = duration;
         self
     }
 
-    /// What makes a run cheap: the time, by default.
+    /// Sets the measure of cost: the computing time, by default.
     #[must_use]
     pub fn against(mut self, cost: Cost) -> Self {
         self.cost = cost;
         self
     }
 
-    /// The title of charts.
+    /// Sets the title of charts.
     #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
     }
 
-    /// Says on standard error how far it is.
+    /// Reports the progress on standard error.
     #[must_use]
     pub fn progress(mut self) -> Self {
         self.progress = true;
@@ -190,11 +198,11 @@ impl<'m> Fidelity<'m> {
 
     /// Makes all runs, one after the other, and repeats them in turn.
     ///
-    /// A run that fails is kept as a point with its error ([`RungPoint::outcome`]), also where no run begins at the start of a rung; the others are
-    /// made all the same.
+    /// A run that fails is kept as a point with its error ([`RungPoint::outcome`]), also if a start is invalid; the
+    /// other runs are made nevertheless.
     ///
     /// # Errors
-    /// [`FidelityError`] where there is nothing to compare, or nothing to compare with.
+    /// [`FidelityError`] if there is nothing to compare, or the reference fails.
     pub fn run(&self) -> Result<Ladder, FidelityError> {
         let grids = self.grids()?;
         let (names, wanted) = self.wanted()?;

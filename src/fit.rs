@@ -1,4 +1,4 @@
-//! Parameters of a model, found from measured outputs of its motion.
+//! Parameter identification: the parameters of a model, fitted to measured outputs of its motion.
 
 mod data;
 mod error;

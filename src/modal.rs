@@ -1,4 +1,4 @@
-//! Modal reduction: a large linear model by its lowest modes.
+//! Modal reduction: a small model from the lowest modes of a large linear one.
 
 mod diagonal;
 mod eigen;
@@ -16,7 +16,8 @@ use eigen::Modes;
 pub use error::ModalError;
 pub use full::Reducible;
 
-/// A linear model by its `R` lowest modes: itself a model, with the amplitudes of the modes as coordinates.
+/// The reduction of a linear model to its `R` lowest modes: itself a model, whose coordinates are the modal amplitudes
+/// a.
 ///
 /// ```text
 /// q = q_s + Φ a ,     K Φ = M Φ diag(ω²) ,     Φᵀ M Φ = 1                        (T-112)
@@ -24,10 +25,15 @@ pub use full::Reducible;
 /// L = ½ Σ (ȧ_k² − ω_k² a_k²) + f·a                                               (T-113)
 /// ```
 ///
-/// q_s is the static equilibrium, as far as there is one: where a mode has ω = 0 and a force acts on it, the force is f and moves it. The full model
-/// is of run-time length, or of fixed size with `S` its `State<N>`. Its matrices are dense here: n² numbers, and a time that grows as n³, once.
+/// Here Φ holds the mass-normalised mode shapes and ω the natural frequencies, and q_s is the static equilibrium. If a
+/// force acts on a rigid-body mode (ω = 0), there is no equilibrium in that direction; the force is f and accelerates
+/// the mode.
 ///
-/// Outputs are those of the full model, so that motions of both have the same columns, and both can be rungs of a [`Fidelity`](crate::Fidelity).
+/// The full model has run-time length, or fixed size with `S` its `State<N>`. Its matrices are dense here: n² numbers,
+/// and a computing time of order n³, once.
+///
+/// The outputs are those of the full model, so that motions of both have the same columns, and both can be compared by
+/// [`Fidelity`](crate::Fidelity).
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -75,11 +81,11 @@ pub struct Modal<'m, M, const R: usize, S = FamilyState> {
 }
 
 impl<'m, M: Reducible<S>, S: PhasePoint, const R: usize> Modal<'m, M, R, S> {
-    /// The `R` modes of least ω² of a model.
+    /// The reduction to the `R` modes of least ω².
     ///
     /// # Errors
-    /// [`ModalError`]: where the model is not linear, depends on time, has forces, dampers, constraints, products of coordinates and velocities, or a kinetic energy that is not
-    /// positive for every velocity; where there are fewer than `R` modes.
+    /// [`ModalError`] if the model is not linear, depends on time, has forces, dissipation, constraints, or products
+    /// of coordinates and velocities, if its mass matrix is not positive definite, or if it has fewer than `R` modes.
     pub fn of(full: &'m M) -> Result<Self, ModalError> {
         let quadratic = full.quadratic()?;
         let coordinates = quadratic.slope_q.len();
@@ -112,9 +118,10 @@ impl<'m, M: Reducible<S>, S: PhasePoint, const R: usize> Modal<'m, M, R, S> {
         Ok(lowest)
     }
 
-    /// Its amplitudes and their rates, a = Φᵀ M (q − q_s) and ȧ = Φᵀ (p − c), c the momentum without velocity (T-114): what the modes have of a state of the full model.
+    /// The modal amplitudes and rates of a state of the full model: a = Φᵀ M (q − q_s) and ȧ = Φᵀ (p − c), with c the
+    /// momentum at zero velocity (T-114).
     ///
-    /// NaN, from which no run begins, where the state is not as long as the model.
+    /// NaN, with which no run begins, if the lengths of the state and the model differ.
     pub fn reduce(&self, state: &S) -> State<R> {
         let n = self.rest.len();
         if state.q().len() != n || state.p().len() != n {
@@ -134,7 +141,8 @@ impl<'m, M: Reducible<S>, S: PhasePoint, const R: usize> Modal<'m, M, R, S> {
         reduced
     }
 
-    /// The state of the full model that belongs to amplitudes and rates.
+    /// The state of the full model that belongs to given amplitudes and rates: the inverse of
+    /// [`reduce`](Self::reduce).
     pub fn expand(&self, state: &State<R>) -> S {
         let q = combination(&self.rest, &self.shapes, &state.q);
         let p = combination(&self.offset, &self.momenta, &state.p);
@@ -143,18 +151,21 @@ impl<'m, M: Reducible<S>, S: PhasePoint, const R: usize> Modal<'m, M, R, S> {
 }
 
 impl<M, S, const R: usize> Modal<'_, M, R, S> {
-    /// The frequencies ω, the lowest first; zero of a rigid motion, and −√|ω²| of a mode that grows, ω² < 0.
+    /// The natural frequencies ω, in radians per unit of time, the lowest first; zero for a rigid-body mode, and
+    /// −√|ω²| for an unstable mode, ω² < 0.
     pub fn frequencies(&self) -> [f64; R] {
         self.squares
             .map(|square| square.abs().sqrt().copysign(square))
     }
 
-    /// The shape of a mode, φ_k with φ_k·M φ_k = 1, its largest entry positive; `None` beyond the modes.
+    /// The shape φ_k of a mode, normalised to φ_k·M φ_k = 1 and with its largest entry positive; `None` if there is no
+    /// such mode.
     pub fn shape(&self, k: usize) -> Option<&[f64]> {
         self.shapes.get(k).map(Vec::as_slice)
     }
 
-    /// The coordinates of the static equilibrium q_s; without one, those without the rigid motions that a force acts on.
+    /// The coordinates q_s of the static equilibrium; if there is none, those without the rigid-body modes on which a
+    /// force acts.
     pub fn equilibrium(&self) -> &[f64] {
         &self.rest
     }

@@ -1,4 +1,5 @@
-//! Optimal control: the inputs of least cost, by direct transcription with the elements of the model.
+//! Optimal control: the inputs of least cost over a span of time, by direct transcription with the elements of the
+//! model.
 
 mod block;
 mod condensed;
@@ -31,22 +32,28 @@ pub use error::{OptimalControlError, OptimalControlErrorKind};
 pub use optimum::{Costate, Optimum};
 pub use search::Iteration;
 
-/// The inputs of least cost over a span of time, to be found.
+/// An optimal-control problem: find the inputs u(t) of a model that minimise the cost
 ///
 /// ```text
 /// ∫ Σ running costs (t, q, v, u) dt + Σ end costs (t, q, v) → min
 /// ```
 ///
-/// under the equations of motion, and what is given of the start and of the end. Costs are outputs of the declaration, so that their derivatives are exact as those of the
-/// model are. Each input is a polynomial in each element; the state is what the element makes of it, so that the solution is a motion of the model as every run is, with its
-/// order and its momentum maps. Unknown are nodes, interiors and inputs of all elements together, with multipliers: sequential quadratic programming with the second
-/// derivatives of the Lagrangian of the problem, (T-144) to (T-148) in `docs/theory.md`. The work of an iteration is linear in the number of elements.
+/// subject to the equations of motion and to the values given at the start and at the end. Costs are outputs of the
+/// model, so that their derivatives are as exact as those of the model.
 ///
-/// Defaults: `Mixed::<4>` (order 6, of states, inputs' integrals and multipliers alike), 40 equal elements, inputs with as many coefficients in an element as it has rates, a guess of
-/// straight lines between the coordinates that are given, with inputs that are zero.
+/// Each input is a polynomial in each element. The states follow from the element, so that the solution is a motion of
+/// the model with the order and the momentum maps that every run with this element has. The unknowns are the nodes,
+/// the interiors and the inputs of all elements together, with multipliers (costates). They are found by sequential
+/// quadratic programming with the second derivatives of the Lagrangian function of the problem: (T-144) to (T-148) in
+/// `docs/theory.md`. The work of an iteration is linear in the number of elements.
 ///
-/// The minimum is one among neighbours: which one, the guess decides. Where the search comes to a point that is stationary without being a minimum, it goes on along a change that lowers the cost
-/// to second order, (T-163); if that leads to no minimum, it is [`OptimalControlErrorKind::NoMinimum`].
+/// Defaults: element `Mixed::<4>` (order 6 for states, integrals of inputs, and multipliers), 40 equal elements,
+/// inputs with as many coefficients in an element as it has rates; the first guess is straight lines between the
+/// coordinates given, with zero inputs.
+///
+/// The minimum found is a local one; which one depends on the guess. If the search reaches a stationary point that is
+/// not a minimum, it continues along a direction of negative curvature, in which the cost falls to second order,
+/// (T-163); if that leads to no minimum, the result is [`OptimalControlErrorKind::NoMinimum`].
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -88,7 +95,7 @@ pub struct OptimalControl<'m, M, const N: usize> {
 type Source<'m> = Box<dyn Fn(f64) -> f64 + 'm>;
 
 impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
-    /// A problem for `model`, without costs and conditions so far.
+    /// A problem for `model`, as yet without costs and conditions.
     pub fn of(model: &'m M) -> Self {
         Self {
             model,
@@ -110,14 +117,15 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         }
     }
 
-    /// The element.
+    /// Sets the element; `Mixed::<4>` by default.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = element.into();
         self
     }
 
-    /// The number of elements, all equally long: of this and [`graded`](Self::graded) the last call counts.
+    /// Sets the number of elements, all of the same length; 40 by default. Of this call and [`graded`](Self::graded)
+    /// the last one counts.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
         self.elements = elements;
@@ -125,7 +133,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         self
     }
 
-    /// One element a weight, each as long as its weight says beside the others.
+    /// Sets one element for each weight, with lengths proportional to the weights.
     #[must_use]
     pub fn graded(mut self, weights: impl IntoIterator<Item = f64>) -> Self {
         self.weights = weights.into_iter().collect();
@@ -133,21 +141,22 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         self
     }
 
-    /// The degree of the inputs in each element: 0 holds them over it. At most the number of points of the element less one.
+    /// Sets the degree of the input polynomials in each element; 0 holds an input constant over the element. At most
+    /// one less than the number of points of the element.
     #[must_use]
     pub fn input_degree(mut self, degree: usize) -> Self {
         self.degree = Some(degree);
         self
     }
 
-    /// From when to when, forwards.
+    /// Sets the span of time, which must go forwards.
     #[must_use]
     pub fn span(mut self, span: Range<f64>) -> Self {
         self.span = span;
         self
     }
 
-    /// The state at the start; the end is free as far as it is not given.
+    /// Sets the whole state at the start. Components of the end that are not set are free.
     #[must_use]
     pub fn from(self, start: State<N>) -> Self {
         (0..N).fold(self, |problem, a| {
@@ -157,7 +166,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         })
     }
 
-    /// The state at the end.
+    /// Sets the whole state at the end.
     #[must_use]
     pub fn to(self, end: State<N>) -> Self {
         (0..N).fold(self, |problem, a| {
@@ -167,13 +176,13 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         })
     }
 
-    /// The states at both ends, and from when to when.
+    /// Sets the states at both ends, and the span.
     #[must_use]
     pub fn from_to(self, start: State<N>, end: State<N>, span: Range<f64>) -> Self {
         self.from(start).to(end).span(span)
     }
 
-    /// Gives one component at the start; what is not given is free.
+    /// Sets one component at the start; components that are not set are free.
     #[must_use]
     pub fn start(mut self, component: Component, value: f64) -> Self {
         self.conditions.push(Condition {
@@ -184,7 +193,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         self
     }
 
-    /// Gives one component at the end; what is not given is free.
+    /// Sets one component at the end; components that are not set are free.
     #[must_use]
     pub fn end(mut self, component: Component, value: f64) -> Self {
         self.conditions.push(Condition {
@@ -195,28 +204,28 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         self
     }
 
-    /// Adds the integral of an output to the cost.
+    /// Adds the time integral of an output to the cost.
     #[must_use]
     pub fn running_cost(mut self, output: &str) -> Self {
         self.running.push(output.to_owned());
         self
     }
 
-    /// Adds the value of an output at the end to the cost. It must not hold inputs.
+    /// Adds the value of an output at the end to the cost. The output must not depend on inputs.
     #[must_use]
     pub fn end_cost(mut self, output: &str) -> Self {
         self.end.push(output.to_owned());
         self
     }
 
-    /// Where to begin: a curve t ↦ (q, dq/dt). It need not be a motion.
+    /// Sets the first guess of the motion: a curve t ↦ (q, dq/dt), which need not satisfy the equations of motion.
     #[must_use]
     pub fn guess(mut self, curve: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
         self.guess = Some(Box::new(curve));
         self
     }
 
-    /// Where to begin with an input: of several calls for one the last counts.
+    /// Sets the first guess of an input; of several calls for one input the last one counts.
     #[must_use]
     pub fn guess_input(mut self, input: &str, function: impl Fn(f64) -> f64 + 'm) -> Self {
         self.inputs.retain(|(own, _)| own != input);
@@ -224,14 +233,16 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         self
     }
 
-    /// When the iteration is done: the size of the last correction beside the solution, 10⁻¹⁰ by default. The correction that meets it is applied, and squares it.
+    /// Sets when the iteration is finished: when the last correction, relative to the solution, is at most this; 10⁻¹⁰
+    /// by default. That correction is still applied, and convergence is quadratic, so that the remaining error is
+    /// about its square.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
         self
     }
 
-    /// The most iterations, 200 by default.
+    /// Sets the largest number of iterations, 200 by default.
     #[must_use]
     pub fn max_iterations(mut self, iterations: usize) -> Self {
         self.control.max_iterations = iterations;
@@ -245,10 +256,11 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         self
     }
 
-    /// Looks for the inputs.
+    /// Solves the problem.
     ///
     /// # Errors
-    /// [`OptimalControlError`]: what is asked for makes no sense, or no minimum was found near the guess; then it holds where the search ended.
+    /// [`OptimalControlError`] if the problem is invalid, or if no minimum was found from the guess; it then holds the
+    /// last iterate.
     pub fn solve(&self) -> Result<Optimum<N>, OptimalControlError<N>> {
         self.check()?;
         let (running, end) = (self.columns(&self.running)?, self.columns(&self.end)?);

@@ -7,8 +7,11 @@ use tfe_runtime::{Model, State};
 
 /// Computes the velocities dq/dt that belong to the momenta of a state.
 pub trait Velocity<const N: usize, L: Length<N> = FixedLength>: Evaluate<N, L> {
-    /// dq/dt of a state at the time t: v with ∂L/∂v = p, or ∂H/∂p. Where the mass matrix is singular it is the velocity that constraints leave (theory.md (T-74)), NaN where they leave none, where the iteration for v of a kinetic
-    /// energy that is not quadratic fails, or, as long as the state, where that is not as long as the model.
+    /// The velocity dq/dt of a state at the time t: the v with ∂L/∂v = p, or ∂H/∂p.
+    ///
+    /// If the mass matrix is singular, it is the velocity that the constraints determine (theory.md (T-74)). It is NaN
+    /// if they do not determine it, if the iteration for v of a kinetic energy that is not quadratic fails, or (with
+    /// the length of the state) if the lengths of state and model differ.
     ///
     /// ```
     /// use tfe::prelude::*;

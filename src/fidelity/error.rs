@@ -5,23 +5,23 @@ use std::error::Error;
 use std::fmt;
 use tfe_runtime::ElementError;
 
-/// Why a [`Fidelity`](super::Fidelity) made no ladder.
+/// Why a [`Fidelity`](super::Fidelity) made no comparison.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum FidelityError {
-    /// There is no model.
+    /// No model was added.
     NoRungs,
-    /// Two rungs have one name.
+    /// Two models (rungs) have the same name.
     SameName {
         /// The name.
         name: String,
     },
-    /// No output is declared by all rungs, or none was asked for.
+    /// No output is declared by all models, or the list of outputs is empty.
     NoOutputs {
         /// Each rung with what it declares.
         declared: Vec<(String, Vec<String>)>,
     },
-    /// An output that was asked for is not declared by a rung.
+    /// An output that was asked for is not declared by one of the models.
     UnknownOutput {
         /// What was asked for.
         output: String,
@@ -30,25 +30,25 @@ pub enum FidelityError {
         /// What it declares.
         declared: Vec<String>,
     },
-    /// A model of run-time length does not fit together.
+    /// The lengths of a model of run-time length do not fit each other.
     Model {
         /// The rung.
         rung: String,
         /// Why.
         source: RunErrorKind,
     },
-    /// No element was left to try.
+    /// The list of elements is empty.
     NoElements,
-    /// An element does not exist (number of nodes, quadrature).
+    /// An element does not exist: an impossible number of nodes, or a quadrature that its family does not have.
     Element(ElementError),
-    /// No accuracy was asked for.
+    /// The list of accuracies is empty.
     NoAccuracies,
     /// An accuracy is not positive, or not finite.
     Accuracy {
         /// What was asked for.
         accuracy: f64,
     },
-    /// The span is not to be divided into no parts, nor into more than there may be steps.
+    /// The number of parts of the span is zero, or larger than the largest number of steps.
     Parts {
         /// The number of parts asked for.
         parts: usize,
@@ -62,9 +62,9 @@ pub enum FidelityError {
         /// The end asked for.
         end: f64,
     },
-    /// The last rung, which the others should be compared with, could not be run.
+    /// The reference, a run of the last model, failed.
     Reference(RunErrorKind),
-    /// Runs of the last rung have no outputs that are numbers.
+    /// The outputs of the reference are not finite.
     ReferenceValue,
 }
 

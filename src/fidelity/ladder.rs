@@ -5,32 +5,33 @@ use crate::work_precision::measurements::pareto;
 use crate::work_precision::{Cost, Reference};
 use tfe_runtime::{Element, Statistics};
 
-/// A model with an element and a step: what it costs, and how far off its outputs are.
+/// A model with an element and a step size: its cost, and the error of its outputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The name of the rung.
+    /// The name of the model (rung).
     pub rung: String,
     /// The element.
     pub element: Element,
-    /// The step, in the units of time, positive.
+    /// The step size, in units of time, positive.
     pub step: f64,
-    /// The largest relative error of the outputs; no less than the [error of the model](Rung::model_error), since a run that is nearer to the truth than
-    /// its own model is so by chance, nor than the uncertainty of the reference.
+    /// The largest relative error of the outputs, but not less than the [error of the model](Rung::model_error),
+    /// because a run that is nearer to the truth than its own model is so by chance, and not less than the uncertainty
+    /// of the reference.
     pub error: f64,
-    /// The largest relative error of the outputs as it was found.
+    /// The largest relative error of the outputs as computed.
     pub distance: f64,
-    /// Seconds that the steps took, the least of all repetitions.
+    /// The time of the steps in seconds, the shortest of all repetitions.
     pub seconds: f64,
-    /// How often the run was repeated for that.
+    /// The number of repetitions.
     pub repetitions: u32,
-    /// Evaluations of first and of second derivatives together.
+    /// The number of evaluations of first and of second derivatives together.
     pub evaluations: u64,
-    /// Steps, iterations, evaluations, factorisations of one run.
+    /// Counts of steps, iterations, evaluations and factorisations of one run.
     pub statistics: Statistics,
 }
 
 impl Choice {
-    /// What it costs.
+    /// The cost in a given measure.
     pub fn cost(&self, cost: Cost) -> f64 {
         match cost {
             Cost::Time => self.seconds,
@@ -41,18 +42,18 @@ impl Choice {
     }
 }
 
-/// A run of one rung.
+/// A run of one model (rung) with one element and one step size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RungPoint {
     /// The element.
     pub element: Element,
-    /// The step, in the units of time, positive.
+    /// The step size, in units of time, positive.
     pub step: f64,
-    /// What was found, or why the run stopped.
+    /// The result, or why the run stopped.
     pub outcome: Result<Choice, RunErrorKind>,
 }
 
-/// The runs of one model.
+/// All runs of one model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rung {
     pub(super) name: String,
@@ -61,37 +62,39 @@ pub struct Rung {
 }
 
 impl Rung {
-    /// The name.
+    /// The name of the model.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// All runs, those that failed included: element by element, the longest step first.
+    /// All runs, including those that failed: element by element, the longest step first.
     pub fn points(&self) -> &[RungPoint] {
         &self.points
     }
 
-    /// The runs that reached their end.
+    /// The runs that reached the end of the span.
     pub fn choices(&self) -> impl Iterator<Item = &Choice> {
         self.points
             .iter()
             .filter_map(|one| one.outcome.as_ref().ok())
     }
 
-    /// How many runs failed.
+    /// The number of runs that failed.
     pub fn failed(&self) -> usize {
         self.points.len() - self.choices().count()
     }
 
-    /// The error of the model: that of its outputs when steps are so short that they no longer matter.
+    /// The error of the model: that of its outputs when steps are so short that the discretisation error no longer
+    /// matters.
     ///
-    /// `None` of the last rung, which is the truth, and where errors of the model were not told from those of the steps: below the smallest accuracy that was
-    /// asked for, or where no step was short enough.
+    /// `None` for the last model, which is the truth, and if the error of the model could not be distinguished from
+    /// that of the steps: because it is below the smallest accuracy asked for, or no step was short enough.
     pub fn model_error(&self) -> Option<f64> {
         self.model_error
     }
 
-    /// The runs for which no other run of this model has both a smaller error and a smaller cost, the cheapest first.
+    /// The Pareto front of this model: the runs for which no other run has both a smaller error and a smaller cost,
+    /// the cheapest first.
     pub fn front(&self, cost: Cost) -> Vec<&Choice> {
         let known = |choice: &&Choice| choice.error.is_finite() && choice.cost(cost).is_finite();
         let places = self
@@ -103,9 +106,9 @@ impl Rung {
     }
 }
 
-/// What a [`Fidelity`](super::Fidelity) found: rungs with their runs, and the cheapest for each accuracy.
+/// The result of a [`Fidelity`](super::Fidelity): the models with their runs, and the cheapest run for each accuracy.
 ///
-/// Printed it is a table with a line for each accuracy asked for.
+/// `Display` prints a table with one line for each accuracy asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ladder {
     pub(super) title: String,
@@ -122,7 +125,7 @@ impl Ladder {
         &self.title
     }
 
-    /// All rungs, the last of them the truth, in the order in which they were added.
+    /// All models in the order in which they were added; the last one is the truth.
     pub fn rungs(&self) -> &[Rung] {
         &self.rungs
     }
@@ -137,25 +140,26 @@ impl Ladder {
         &self.accuracies
     }
 
-    /// What outputs were compared with.
+    /// The reference with which outputs were compared.
     pub fn reference(&self) -> &Reference {
         &self.reference
     }
 
-    /// With another cost in choices and charts.
+    /// Changes the measure of cost for choices and charts.
     #[must_use]
     pub fn against(mut self, cost: Cost) -> Self {
         self.cost = cost;
         self
     }
 
-    /// Whether errors so small can be told: twice the uncertainty of the reference or more.
+    /// Whether errors of this size can be distinguished from those of the reference: whether it is at least twice the
+    /// uncertainty of the reference.
     pub fn is_known(&self, accuracy: f64) -> bool {
         accuracy >= 2.0 * self.reference.uncertainty()
     }
 
-    /// The cheapest run of all rungs with errors of at most `accuracy`; `None` where no run is so accurate, or none can be told to be
-    /// ([`is_known`](Self::is_known)).
+    /// The cheapest run of all models with an error of at most `accuracy`; `None` if no run is so accurate, or if such
+    /// an error cannot be distinguished from that of the reference ([`is_known`](Self::is_known)).
     pub fn cheapest(&self, accuracy: f64) -> Option<&Choice> {
         if !self.is_known(accuracy) {
             return None;

@@ -15,18 +15,19 @@ mod pictures;
 const HEADER: &str = "rung,element,step,error,distance,model_error,seconds,repetitions,steps,iterations,evaluations,on_front,failure\n";
 
 impl Ladder {
-    /// Writes a chart into a file `.svg` (cost against error, both logarithmic), all figures into a file `.csv`, chart and table of choices into a
-    /// page `.html`.
+    /// Writes a file: a chart (cost against error, both logarithmic) as `.svg`, all numbers as `.csv`, or chart and
+    /// table of choices as a page `.html`.
     ///
     /// # Errors
-    /// [`SaveError::UnknownEnding`]; [`SaveError::Io`]; [`SaveError::NoCharts`] for pictures without the feature `charts`;
-    /// [`SaveError::Chart`] where there is nothing to draw.
+    /// [`SaveError::UnknownEnding`] for another ending, [`SaveError::Io`] if the file cannot be written,
+    /// [`SaveError::NoCharts`] for pictures without the feature `charts`, [`SaveError::Chart`] if there is nothing to
+    /// draw.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), SaveError> {
         self.save_as(path.as_ref())
     }
 
-    /// All runs as text: a header, then a line for each, those that failed with their error in the last column. Numbers read back exactly; what is
-    /// not finite, or was not measured, is an empty field.
+    /// All runs as CSV: a header, then one line for each run; runs that failed have their error in the last column.
+    /// Numbers read back exactly; a value that is not finite, or was not measured, is an empty field.
     pub fn to_csv(&self) -> String {
         let mut text = String::from(HEADER);
         for rung in &self.rungs {

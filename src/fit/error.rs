@@ -8,34 +8,36 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum FitError {
-    /// No parameter is looked for, and the start is known.
+    /// Nothing is unknown: no parameter was named, and the start is given.
     NothingUnknown,
     /// There are no measured values.
     NothingMeasured,
-    /// The model has no parameter of a name, or it was named twice.
+    /// The model has no parameter of this name, or it was named twice.
     NoParameter {
         /// The name asked for.
         name: String,
         /// Those that there are.
         known: Vec<String>,
     },
-    /// The model cannot be made with other parameters, nor copied: it has no parameter, or a field of a type that cannot be copied.
+    /// The model cannot be copied with other parameters: it has none, or it has a field of a type that cannot be
+    /// copied.
     NotCopied,
-    /// The model has neither an output nor a coordinate of a name.
+    /// The model has neither an output nor a coordinate of this name.
     NoOutput {
         /// The name asked for.
         name: String,
         /// Those that there are.
         known: Vec<String>,
     },
-    /// Values that cannot be used.
+    /// Measured values that cannot be used.
     Measured {
         /// The output.
         name: String,
         /// What is wrong with them.
         why: &'static str,
     },
-    /// A range that does not hold the first value of its parameter, or belongs to none that is looked for.
+    /// A range that does not contain the first value of its parameter, or that belongs to a parameter that is not
+    /// fitted.
     Bounds {
         /// The parameter.
         name: String,
@@ -46,27 +48,27 @@ pub enum FitError {
         /// The first value; NaN where it is not looked for.
         value: f64,
     },
-    /// Something was measured before the start.
+    /// A value was measured before the start.
     Early {
         /// The first time of a measurement.
         time: f64,
         /// The time of the start.
         start: f64,
     },
-    /// The start of a model with constraints is not looked for.
+    /// The start of a model with constraints cannot be an unknown; give it with `start`.
     StartOfConstraints,
-    /// Fewer values than unknowns.
+    /// There are fewer measured values than unknowns.
     TooFew {
         /// Measured values.
         values: usize,
         /// Parameters and numbers of the start that are looked for.
         unknowns: usize,
     },
-    /// The run with the first parameters fails. Later ones that fail are refused as too far.
+    /// The run with the first parameters failed. (If a later run fails, the step of the fit is shortened.)
     Run(RunErrorKind),
-    /// An output, or its derivative, is not finite with the first parameters.
+    /// With the first parameters, an output or its derivative is not finite.
     NotFinite,
-    /// The iteration has not ended.
+    /// The iteration did not converge.
     NotConverged {
         /// The unknowns where the error was least, in the order of parameters and start.
         best: Vec<f64>,
@@ -77,7 +79,7 @@ pub enum FitError {
         /// What the iteration says.
         why: String,
     },
-    /// The values do not tell all unknowns: some change of them changes no output.
+    /// The measured values do not determine all unknowns: some change of the unknowns changes no output.
     Undetermined {
         /// The one that takes most part in that change.
         name: String,

@@ -6,7 +6,8 @@ use nalgebra::DMatrix;
 use std::fmt;
 use tfe_runtime::State;
 
-/// A model with the parameters that were found, from [`Fit::solve`](super::Fit::solve).
+/// The result of a fit: the model with the fitted parameters, their covariance and the residuals; from
+/// [`Fit::solve`](super::Fit::solve).
 #[derive(Clone, Debug)]
 pub struct Fitted<M, const N: usize> {
     pub(super) model: M,
@@ -20,68 +21,71 @@ pub struct Fitted<M, const N: usize> {
     pub(super) trials: Vec<Trial>,
 }
 
-/// A run on the way.
+/// One run during the iteration of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
-    /// The unknowns, in the order of [`Fitted::names`].
+    /// The values of the unknowns, in the order of [`Fitted::names`].
     pub values: Vec<f64>,
-    /// The root of the mean square of (y − m)/σ; infinite where the run failed.
+    /// The root mean square of the weighted residuals (y − m)/σ; infinite if the run failed.
     pub deviation: f64,
 }
 
 impl<M, const N: usize> Fitted<M, N> {
-    /// The model with the parameters that were found.
+    /// The model with the fitted parameters.
     pub fn model(&self) -> &M {
         &self.model
     }
 
-    /// Its motion over the measurements.
+    /// The motion of the fitted model over the time of the measurements.
     pub fn motion(&self) -> &Motion<N> {
         &self.motion
     }
 
-    /// The state at the start, found or given.
+    /// The state at the start, fitted or given.
     pub fn start(&self) -> State<N> {
         self.motion.states()[0].state()
     }
 
-    /// What was looked for: parameters, then of a start that was not known all momenta and all coordinates, as `momentum of theta at the start` and `theta at the start`.
+    /// The names of the unknowns: the parameters, then, if the start was unknown, all momenta and all coordinates, as
+    /// `momentum of theta at the start` and `theta at the start`.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// The values found, in this order.
+    /// The fitted values of the unknowns, in the order of [`names`](Self::names).
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// The value of one; `None` where it was not looked for.
+    /// The fitted value of one unknown; `None` if there is no unknown of this name.
     pub fn value(&self, name: &str) -> Option<f64> {
         Some(self.values[self.place(name)?])
     }
 
-    /// The standard deviation of one, the root of its [covariance](Self::covariance) with itself.
+    /// The standard deviation of one unknown, the square root of its variance in the [covariance](Self::covariance);
+    /// `None` if there is no unknown of this name.
     pub fn deviation(&self, name: &str) -> Option<f64> {
         Some(self.deviations[self.place(name)?])
     }
 
-    /// The covariance of the values,
+    /// The covariance matrix of the unknowns,
     ///
     /// ```text
     /// s² (JᵀJ)⁻¹ ,     s² = Σ r² / (values − unknowns) ,     J = ∂r/∂(unknowns) ,     r = (y − m)/σ                (T-126)
     /// ```
     ///
-    /// to first order; with as many values as unknowns s is one.
+    /// to first order; s is one if there are as many values as unknowns. Rows and columns are in the order of
+    /// [`names`](Self::names).
     pub fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
     }
 
-    /// (y − m)/σ for every value, in the order in which they were given.
+    /// The weighted residuals (y − m)/σ of all measured values, in the order in which they were given.
     pub fn residuals(&self) -> &[f64] {
         &self.residuals
     }
 
-    /// The runs on the way, how each unknown was moved.
+    /// The runs of the iteration, which show how each unknown moved.
     pub fn trials(&self) -> &[Trial] {
         &self.trials
     }

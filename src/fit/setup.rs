@@ -6,14 +6,14 @@ use crate::simulation::Simulation;
 use std::ops::{Bound, RangeBounds};
 use tfe_runtime::{Element, Model, State};
 
-/// Finds the parameters of a model with which its motion comes nearest to measured values.
+/// Fits parameters of a model to measured values m_i of its outputs y, by least squares:
 ///
 /// ```text
 /// Σ ((y(t_i; a, y₀) − m_i)/σ_i)² → min                                                       (T-125)
 /// ```
 ///
-/// by the method of Levenberg and Marquardt, with derivatives that are exact for the numbers of every run ([`Simulation::run_sensitive`]). Elements end at the times of the
-/// measurements.
+/// over the parameters a and, if unknown, the start y₀, by the method of Levenberg and Marquardt. The derivatives of
+/// every run are exact up to rounding ([`Simulation::run_sensitive`]). Elements end at the times of the measurements.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -42,12 +42,14 @@ use tfe_runtime::{Element, Model, State};
 /// # }
 /// ```
 ///
-/// Least squares find the nearest minimum: where motions oscillate, the first parameters must keep their phase over the measurements. If they do not, a fit of the first few swings makes better
-/// ones for a fit of all, as in `examples/pendulum_fit.rs`.
+/// The method finds the nearest minimum. For motions that oscillate, the first parameters must therefore keep the
+/// phase right over all measurements. If they do not, first fit a few oscillations, and use the result to begin a fit
+/// of all, as in `examples/pendulum_fit.rs`.
 ///
-/// Models with inputs are fitted as [`Driven`](crate::Driven), with the inputs that they had when they were measured.
+/// Models with inputs are fitted as [`Driven`](crate::Driven), with the inputs that acted during the measurements.
 ///
-/// Without a [`start`](Self::start) the state at the first time is unknown, too, and looked for from rest at zero on; [`start_near`](Self::start_near) tells a better guess.
+/// Without a [`start`](Self::start), the state at the first time is unknown, too, and the iteration begins with rest
+/// at zero; [`start_near`](Self::start_near) gives a better guess.
 #[derive(Debug)]
 pub struct Fit<'m, M, const N: usize> {
     pub(super) model: &'m M,
@@ -70,7 +72,7 @@ pub(super) enum Start<const N: usize> {
 }
 
 impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
-    /// A fit of this model: its other parameters stay as they are, those that are looked for begin there.
+    /// A fit of this model. Parameters that are not fitted keep its values; those that are begin there.
     pub fn new(model: &'m M) -> Self {
         Self {
             model,
@@ -85,43 +87,45 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         }
     }
 
-    /// The state at the time `t0`, which is known.
+    /// Sets the known state at the time `t0`.
     #[must_use]
     pub fn start(mut self, start: State<N>, t0: f64) -> Self {
         self.start = Start::Known(start, t0);
         self
     }
 
-    /// A guess of the state at the time `t0`, which is looked for together with the parameters.
+    /// Sets a guess of the state at the time `t0`, which is fitted together with the parameters.
     #[must_use]
     pub fn start_near(mut self, guess: State<N>, t0: f64) -> Self {
         self.start = Start::Near(guess, t0);
         self
     }
 
-    /// The element of all runs, as [`Simulation::element`].
+    /// Sets the element of all runs, as [`Simulation::element`] does.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = Some(element.into());
         self
     }
 
-    /// The step of all runs, as [`Simulation::step`]; a thousandth of the span by default.
+    /// Sets the step size of all runs, as [`Simulation::step`] does; one thousandth of the span by default.
     #[must_use]
     pub fn step(mut self, step: f64) -> Self {
         self.step = Some(step);
         self
     }
 
-    /// The parameters that are looked for: fields of type `f64`, or elements of arrays, `k[2]`.
+    /// Sets the parameters to be fitted: fields of type `f64`, or elements of arrays, `k[2]`.
     #[must_use]
     pub fn parameters<S: Into<String>>(mut self, names: impl IntoIterator<Item = S>) -> Self {
         self.parameters.extend(names.into_iter().map(Into::into));
         self
     }
 
-    /// Keeps a parameter in a range, as `.bounds("c", 0.0..)`. The parameter is looked for in a number without bounds of which it is a smooth function; a range that is empty or
-    /// does not hold the value at the beginning is an error of [`solve`](Self::solve).
+    /// Keeps a parameter within a range, as in `.bounds("c", 0.0..)`.
+    ///
+    /// The parameter is expressed as a smooth function of a number without bounds, and that number is fitted.
+    /// [`solve`](Self::solve) returns an error if the range is empty or does not contain the first value.
     #[must_use]
     pub fn bounds(mut self, name: impl Into<String>, range: impl RangeBounds<f64>) -> Self {
         let number = |bound: Bound<&f64>, otherwise: f64| match bound {
@@ -134,7 +138,8 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         self
     }
 
-    /// Measured values of an output of the model, or of a coordinate, all as certain as one another.
+    /// Adds measured values of an output of the model, or of a coordinate, with standard deviation 1: all are equally
+    /// certain.
     #[must_use]
     pub fn output(
         self,
@@ -145,7 +150,8 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         self.output_within(name, times, values, 1.0)
     }
 
-    /// The same with the standard deviation σ of their errors: so values of several kinds are weighed.
+    /// Adds measured values with the standard deviation σ of their errors, in the unit of the output. Use it to weigh
+    /// values of different kinds.
     #[must_use]
     pub fn output_within(
         mut self,
@@ -163,14 +169,15 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         self
     }
 
-    /// Lets elements end at a time, as [`Simulation::break_at`]: where an input jumps, or at the knots of its table.
+    /// Makes elements end at a time, as [`Simulation::break_at`] does: where an input jumps, or at the times of its
+    /// table.
     #[must_use]
     pub fn break_at(mut self, time: f64) -> Self {
         self.breaks.push(time);
         self
     }
 
-    /// Shows every trial on standard error.
+    /// Shows every run of the iteration on standard error.
     #[must_use]
     pub fn progress(mut self) -> Self {
         self.progress = true;

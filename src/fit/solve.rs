@@ -9,10 +9,10 @@ use super::unknowns::Unknowns;
 use tfe_runtime::Model;
 
 impl<M: Model<N>, const N: usize> Fit<'_, M, N> {
-    /// Looks for the parameters.
+    /// Fits the parameters.
     ///
     /// # Errors
-    /// [`FitError`] says what cannot be fitted, or why it was not.
+    /// [`FitError`] says what cannot be fitted, or why the iteration failed.
     pub fn solve(&self) -> Result<Fitted<M, N>, FitError> {
         let columns = self.columns()?;
         let (t0, guess, start_is_known) = self.first(&columns)?;

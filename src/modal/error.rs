@@ -4,40 +4,41 @@ use std::error::Error;
 use std::fmt;
 use tfe_runtime::family;
 
-/// Why a [`Modal`](super::Modal) could not be made of a model.
+/// Why a model cannot be reduced to its modes.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ModalError {
-    /// Second derivatives of the energy function are not constant.
+    /// The model is not linear: second derivatives of its energy function are not constant.
     NotLinear,
-    /// The time appears in the model.
+    /// The model depends on time.
     TimeDependent,
-    /// There are generalized forces or dissipation.
+    /// The model has generalized forces or dissipation.
     Forced,
-    /// There are constraints.
+    /// The model has constraints.
     Constrained,
-    /// A velocity (or momentum) is multiplied by a coordinate. Modes are complex where ∂²L/∂v∂q is not symmetric. A symmetric part is the time derivative ½ d(q·S q)/dt: in a Lagrangian it moves nothing
-    /// and can be left out.
+    /// A velocity (or momentum) is multiplied by a coordinate. If ∂²L/∂v∂q is not symmetric, the modes are complex
+    /// (gyroscopic forces). A symmetric part is the total time derivative ½ d(q·S q)/dt: in a Lagrangian it has no
+    /// effect and can be left out.
     VelocityCoupling {
         /// The velocity. Of the entries those are told first that have no equal counterpart.
         velocity: usize,
         /// The coordinate.
         coordinate: usize,
     },
-    /// The kinetic energy is not positive for every velocity.
+    /// The mass matrix is not positive definite.
     MassNotPositive,
     /// An entry of the matrices is not finite.
     NotFinite,
-    /// There is no such number of modes.
+    /// The number of modes asked for is zero or larger than the number of coordinates.
     Modes {
         /// How many were asked for.
         modes: usize,
         /// How many coordinates there are.
         coordinates: usize,
     },
-    /// The iteration for eigenvalues did not end.
+    /// The iteration for eigenvalues did not converge.
     NoEigenvalues,
-    /// Lengths of a model of run-time length do not belong together.
+    /// The lengths of a model of run-time length do not fit each other.
     Family(family::ModelError),
 }
 

@@ -6,8 +6,8 @@ use nalgebra::{DMatrix, DVector};
 use tfe_runtime::family::{self, Block, Entries, FamilyState, Gradient};
 use tfe_runtime::{CoordinateName, Facts, First, Form, Model, Real, Second, State};
 
-/// A model with states of type `S` that has modes: every [`Model`] with [`State`] and every [`family::Model`] with [`FamilyState`]. Not to be
-/// implemented elsewhere.
+/// A model with states of type `S` that can be reduced to modes: every [`Model`] with [`State`] and every
+/// [`family::Model`] with [`FamilyState`]. Not to be implemented elsewhere.
 pub trait Reducible<S> {
     /// By which function the model was declared.
     const DECLARED: Form;

@@ -7,7 +7,7 @@ use std::error::Error;
 use std::fmt;
 use tfe_runtime::{ElementError, LegendreError};
 
-/// Why no inputs of least cost were found, and where the search has ended.
+/// Why no inputs of least cost were found, and the iterate at which the search ended.
 #[derive(Clone)]
 pub struct OptimalControlError<const N: usize> {
     kind: OptimalControlErrorKind,
@@ -28,60 +28,61 @@ impl<const N: usize> OptimalControlError<N> {
         }
     }
 
-    /// What went wrong.
+    /// The kind of the error.
     pub fn kind(&self) -> &OptimalControlErrorKind {
         &self.kind
     }
 
-    /// Where the search has ended, with its history; `None` where it did not begin. What it holds is no motion as long as its elements have gaps.
+    /// The iterate at which the search ended, with its history; `None` if the search did not begin. It is not a motion
+    /// of the model as long as there are gaps between its elements.
     pub fn partial(&self) -> Option<&Optimum<N>> {
         self.partial.as_deref()
     }
 }
 
-/// What went wrong.
+/// Why an optimal-control problem was not solved.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum OptimalControlErrorKind {
-    /// The span, the mesh or what is given at the ends makes no sense.
+    /// The span, the mesh, or the values given at the ends are invalid.
     Ends(BoundaryError),
-    /// The span goes backwards: integrals of costs would be negative.
+    /// The span goes backwards in time, so that integrals of costs would have the opposite sign.
     Backwards,
     /// The element does not exist.
     Element(ElementError),
-    /// The model has constraints, with which this cannot be done.
+    /// The model has constraints, which are not supported here.
     Constrained {
         /// The first of them.
         constraint: &'static str,
     },
-    /// Nothing costs anything.
+    /// No cost was given.
     NoCost,
-    /// A cost is no output of the model.
+    /// A cost is not an output that the model declares.
     UnknownOutput {
         /// The name asked for.
         name: String,
         /// Those that there are.
         known: Vec<String>,
     },
-    /// A cost of the end holds an input, which has no value there of its own.
+    /// An end cost depends on an input, which has no value of its own at the end.
     EndCostOfInput {
         /// The output.
         output: String,
         /// The input.
         input: &'static str,
     },
-    /// A guess is for an input that the model does not have.
+    /// A guess was given for an input that the model does not have.
     Input(InputError),
-    /// The inputs have a higher degree than the points of an element tell.
+    /// The degree of the inputs is higher than the points of an element can determine.
     Degree {
         /// The degree asked for.
         degree: usize,
         /// The largest there is.
         largest: usize,
     },
-    /// A momentum of the guess could not be found.
+    /// A momentum of the guess could not be found (Legendre transform).
     Legendre(LegendreError),
-    /// An element has no linearisation: a number is not finite, or its equations are singular.
+    /// An element could not be linearised: a number is not finite, or its equations are singular.
     Undefined {
         /// The number of the element, from 0; as many as there are elements for the cost of the end.
         element: usize,
@@ -90,13 +91,14 @@ pub enum OptimalControlErrorKind {
         /// Iterations done.
         iterations: usize,
     },
-    /// No quadratic model of the problem has one minimum: an input costs nothing and moves nothing, the cost curves down along what is free of the start by more than inputs cost, or small changes of the
-    /// inputs do not bring the motion to its ends.
+    /// No quadratic model of the problem has a unique minimum: an input has neither a cost nor an effect, the negative
+    /// curvature of the cost along the free part of the start exceeds the cost of inputs, or small changes of the
+    /// inputs cannot bring the motion to the values given at its ends (the problem is not controllable).
     Singular {
         /// Iterations done.
         iterations: usize,
     },
-    /// The search came to no end.
+    /// The iteration did not converge.
     Stalled {
         /// Iterations done.
         iterations: usize,
@@ -105,8 +107,10 @@ pub enum OptimalControlErrorKind {
         /// What was asked for.
         tolerance: f64,
     },
-    /// The search came to a point where small changes of the inputs, and of what is free of the start, do not change the cost to first order but lower it to second: a saddle or a maximum, as a pendulum
-    /// that hangs at rest where that costs most. No minimum was found on from there; or the cost falls without end.
+    /// The search reached a stationary point that is not a minimum: small changes of the inputs, and of the free part
+    /// of the start, change the cost in second order only, but lower it. It is a saddle point or a maximum, such as a
+    /// pendulum that hangs at rest where that costs most. No minimum was found from there, or the cost decreases
+    /// without bound.
     NoMinimum {
         /// The number of the element in which the changes begin that lower the cost, from 0.
         element: usize,

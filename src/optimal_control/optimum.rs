@@ -15,7 +15,7 @@ use tfe_runtime::condenser::Condenser;
 use tfe_runtime::scheme::SchemeRef;
 use tfe_runtime::{Controlled, Element, Form, State, Statistics};
 
-/// The inputs of least cost, and the motion that they make.
+/// The solution of an optimal-control problem: the inputs of least cost, and the motion that they cause.
 #[derive(Clone)]
 pub struct Optimum<const N: usize> {
     pub(super) cost: f64,
@@ -37,34 +37,37 @@ impl<const N: usize> fmt::Debug for Optimum<N> {
     }
 }
 
-/// What a node is worth: the derivatives of the least cost by a shift of its state.
+/// The costate (multiplier) of a node: the derivatives of the least cost with respect to a change of its state.
 ///
-/// At the start they are the derivatives by the state that was given, in between and at the end those by a jump of the state there.
+/// At the start these are the derivatives with respect to the state that was given; at other nodes those with respect
+/// to a jump of the state there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costate<const N: usize> {
     /// The time of the node.
     pub t: f64,
-    /// By the coordinates.
+    /// The derivatives with respect to the coordinates.
     pub q: [f64; N],
-    /// By the momenta.
+    /// The derivatives with respect to the momenta.
     pub p: [f64; N],
 }
 
 impl<const N: usize> Optimum<N> {
-    /// The cost.
+    /// The value of the cost.
     pub fn cost(&self) -> f64 {
         self.cost
     }
 
-    /// The motion, with dense output; its nodes are the ends of the elements. An output that holds an input is at a node that of the element that ends there.
+    /// The motion, with dense output; its nodes are the ends of the elements. At a node, an output that depends on an
+    /// input has the value of the element that ends there.
     pub fn motion(&self) -> &Motion<N> {
         &self.motion
     }
 
-    /// An input at some time; where two elements meet, that of the one that begins. Before the start and behind the end the polynomials go on.
+    /// The value of an input at a time. Where two elements meet, it is that of the element that begins there. Before
+    /// the start and after the end, the polynomials are extrapolated.
     ///
     /// # Errors
-    /// [`InputError::Unknown`].
+    /// [`InputError::Unknown`] if the model has no input of this name.
     pub fn input(&self, name: &str, t: f64) -> Result<f64, InputError> {
         let place = self.names.iter().position(|own| *own == name);
         let place = place.ok_or_else(|| InputError::Unknown {
@@ -74,9 +77,10 @@ impl<const N: usize> Optimum<N> {
         Ok(self.pieces.at(self.pieces.element(t), place, t))
     }
 
-    /// The model with these inputs, for what takes models: runs with other steps, elements and starts, integrals of outputs along the motion.
+    /// The model with these inputs, for runs with other steps, elements and starts, for integrals of outputs along the
+    /// motion, and everything else that takes a model.
     ///
-    /// `model` must be of the type that was asked about; its parameters may differ.
+    /// `model` must have the type of the model of the problem; its parameters may differ.
     pub fn steered<'m, M: Controlled<N>>(&self, model: &'m M) -> Driven<'m, M> {
         let pieces = Arc::clone(&self.pieces);
         steered(model, |input| {
@@ -85,12 +89,12 @@ impl<const N: usize> Optimum<N> {
         })
     }
 
-    /// The multipliers of the equations of motion, one for each node: what a change of its state is worth.
+    /// The multipliers of the equations of motion (costates), one for each node.
     pub fn multipliers(&self) -> &[Costate<N>] {
         &self.costates
     }
 
-    /// The iterations, as they went.
+    /// The iterations of the search, in order.
     pub fn history(&self) -> &[Iteration] {
         &self.history
     }

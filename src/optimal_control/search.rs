@@ -7,20 +7,23 @@ use super::problem::{Evaluation, Iterate, Problem};
 use crate::assembly::size;
 use nalgebra::DVector;
 
-/// One iteration, as it went.
+/// One iteration of the search.
 ///
-/// A correction below the tolerance that other iterations follow was that of a stationary point that is no minimum, which the search has left.
+/// If further iterations follow one whose correction is below the tolerance, it had reached a stationary point that is
+/// not a minimum, and the search has left it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Iteration {
-    /// The cost before it.
+    /// The cost before the iteration.
     pub cost: f64,
-    /// The largest gap between an element's end and the node that follows, beside the largest number of the nodes.
+    /// The largest gap between the end of an element and the node that follows, relative to the largest number of the
+    /// nodes.
     pub gap: f64,
-    /// The size of the correction beside the solution.
+    /// The size of the correction, relative to the solution.
     pub correction: f64,
-    /// The part of the correction that was taken.
+    /// The fraction of the correction that was applied (line search).
     pub fraction: f64,
-    /// The share of the curvature of the equations that the quadratic model had: 1 makes it Newton's method.
+    /// The weight of the curvature of the equations of motion in the quadratic model; with 1 the iteration is Newton's
+    /// method.
     pub curvature: f64,
 }
 

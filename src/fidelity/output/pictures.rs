@@ -8,8 +8,8 @@ use crate::fidelity::{Choice, Ladder, Rung};
 const LOST: f64 = 10.0;
 
 impl Ladder {
-    /// Cost against error, both logarithmic: the front of each rung, and a vertical line where the error of its model ends it. The legend tells errors of
-    /// models, and counts runs that failed.
+    /// A chart of cost against error, both logarithmic: the Pareto front of each model, and a vertical line where the
+    /// error of the model ends it. The legend gives the errors of the models and the number of runs that failed.
     pub fn chart(&self) -> Chart {
         let logarithmic = |label: &str| Axis::new(label).scale(Scale::Logarithmic);
         let mut chart = Chart::new(&self.title)
@@ -48,10 +48,10 @@ impl Ladder {
         drawn.map(place).collect()
     }
 
-    /// A section of a page: what was compared, the chart, a table of choices and one of rungs.
+    /// A section of a page: what was compared, the chart, a table of choices and a table of models.
     ///
     /// # Errors
-    /// [`ChartError::NoData`] where no run reached its end.
+    /// [`ChartError::NoData`] if no run reached its end.
     pub fn section(&self) -> Result<Section, ChartError> {
         let text = format!(
             "Errors are the largest of the outputs ({}), each relative to its largest value. Reference: the last rung, {}. Times are of the steps \
