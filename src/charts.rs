@@ -1,4 +1,5 @@
-//! Pictures without a program for pictures: line charts, maps over two parameters, pages. Feature `charts`, on by default.
+//! Charts without other programs: line charts, maps over two parameters, and HTML pages. Feature `charts`, on by
+//! default.
 //!
 //! * [`Chart`]: curves over one axis, as SVG or as CSV;
 //! * [`HeatMap`]: a value or a class in every cell of a rectangle, as SVG, PNG or CSV;
@@ -19,7 +20,7 @@
 //! # }
 //! ```
 //!
-//! The pictures have no `id`s, scripts, style sheets or links, so that several of them go into one document.
+//! The pictures have no `id`s, scripts, style sheets or links, so that several of them can be put into one document.
 
 mod axis;
 mod canvas;

@@ -1,4 +1,4 @@
-//! Accuracy against cost: which element, with which step, reaches an error in the least time.
+//! Work–precision diagrams: which element, with which step size, reaches an error in the least time.
 
 mod error;
 mod fit;
@@ -34,7 +34,8 @@ pub use point::{Cost, Measured, Point};
 pub use reference::Reference;
 pub use subject::{PhasePoint, Subject};
 
-/// Runs one model with several elements and steps, and measures what each run costs and how far off it ends.
+/// A work–precision comparison: runs one model with several elements and step sizes, and measures the cost and the
+/// error of each run.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -66,16 +67,18 @@ pub use subject::{PhasePoint, Subject};
 /// # }
 /// ```
 ///
-/// Errors are those of the state, coordinates and momenta apart, relative to the largest state of the reference:
+/// Errors are those of the state at the end, for coordinates and momenta separately, relative to the largest state of
+/// the reference:
 ///
 /// ```text
 /// error_q = |q − q_ref| / max |q_ref| ,   error_p = |p − p_ref| / max |p_ref|      (Euclidean norms; absolute where all q_ref are zero)
 /// ```
 ///
-/// Times are those of the steps alone, on one processor, the best of several repetitions where a run is short. What they are compared
-/// with is a `reference` of one's own, or else a run with `Mixed::<8>` whose step is halved until it no longer changes.
+/// Times are those of the steps alone, on one processor, the best of several repetitions if a run is short. The
+/// reference is the one given by `reference`, or else a run with `Mixed::<8>` whose step size is halved until it no
+/// longer changes.
 ///
-/// Models of run-time length are measured by the same calls: `S` is the type of the states, [`State`](crate::State) or
+/// Models of run-time length are measured by the same calls; `S` is the type of the states, [`State`](crate::State) or
 /// [`FamilyState`](crate::family::FamilyState).
 ///
 /// ```
@@ -101,8 +104,8 @@ pub use subject::{PhasePoint, Subject};
 /// # }
 /// ```
 ///
-/// What a family cannot run (an element or a solver, see [`Simulation`](crate::Simulation)) is a failed point that says
-/// why; the other curves are measured all the same.
+/// An element or a solver that a model of run-time length cannot use (see [`Simulation`](crate::Simulation)) makes a
+/// failed point that says why; the other curves are measured nevertheless.
 pub struct WorkPrecision<'m, M, S> {
     model: &'m M,
     start: S,
@@ -122,7 +125,8 @@ pub struct WorkPrecision<'m, M, S> {
 }
 
 impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
-    /// Runs of `model` from `start` over the span, backwards where it ends before it starts; no element and no step so far.
+    /// A comparison of runs of `model` from `start` over the span, backwards in time if it ends before it starts; as
+    /// yet without elements and step sizes.
     pub fn new(model: &'m M, start: S, span: Range<f64>) -> Self {
         Self {
             model,
@@ -143,7 +147,7 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
         }
     }
 
-    /// Adds an element: a curve for each solver.
+    /// Adds an element, which makes one curve for each solver.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.elements.push(element.into());
@@ -157,38 +161,41 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
         self
     }
 
-    /// Adds steps, in the units of time, in any order. Where the span is no whole number of steps the last one is shorter.
+    /// Adds step sizes, in units of time, in any order. Where the span is not a whole number of steps, the last step
+    /// is shorter.
     #[must_use]
     pub fn steps(mut self, steps: impl IntoIterator<Item = f64>) -> Self {
         self.steps.extend(steps);
         self
     }
 
-    /// Adds a way of solving the equations of an element; `Solve::Auto` alone where none is added.
+    /// Adds a way of solving the equations of an element; if none is added, `Solve::Auto` is used.
     #[must_use]
     pub fn solver(mut self, solve: Solve) -> Self {
         self.solvers.push(solve);
         self
     }
 
-    /// When the iteration inside an element is done, as in [`Simulation::tolerance`](crate::Simulation::tolerance). It limits the
-    /// accuracy as well as the cost.
+    /// Sets the tolerance of the iteration inside an element, as
+    /// [`Simulation::tolerance`](crate::Simulation::tolerance) does. It limits the accuracy as well as the cost.
     #[must_use]
     pub fn tolerance(mut self, tolerance: f64) -> Self {
         self.control.tolerance = tolerance;
         self
     }
 
-    /// Several tolerances instead of one: each point takes the loosest that leaves its error within a quarter of that with the tightest that the iteration meets, and
-    /// [names it](Point::tolerance). To iterate to round-off for an error of 1e-4 would waste time.
+    /// Sets several tolerances instead of one. Each point uses the loosest of them that changes its error by no more
+    /// than a quarter, compared with the tightest that the iteration reaches, and [names it](Point::tolerance):
+    /// iterating to rounding for an error of 1e-4 would waste time.
     #[must_use]
     pub fn tolerances(mut self, tolerances: impl IntoIterator<Item = f64>) -> Self {
         self.tolerances.extend(tolerances);
         self
     }
 
-    /// Adds a curve of another integrator, by the same clock and against the same reference: `run` is called with each setting (a tolerance,
-    /// a step), in turn with the elements and as often, and says where it ended and how long its steps took.
+    /// Adds a curve of another integrator (a peer), measured by the same clock and against the same reference. The
+    /// function `run` is called with each setting (a tolerance or a step size), in turn with the runs of the elements
+    /// and as often, and returns the state at the end and the time of its steps.
     ///
     /// ```
     /// use std::time::Instant;
@@ -236,42 +243,44 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
         self
     }
 
-    /// The most iterations an element may take before its run counts as failed.
+    /// Sets the largest number of iterations in one element; if an element needs more, the run counts as failed.
     #[must_use]
     pub fn max_iterations(mut self, iterations: u32) -> Self {
         self.control.max_iterations = iterations;
         self
     }
 
-    /// The relative error of the reference that was given. Of a computed reference it is the least that is believed.
+    /// Sets the relative error of the reference that was given; of a computed reference, the least error that is
+    /// assumed.
     #[must_use]
     pub fn reference_uncertainty(mut self, uncertainty: f64) -> Self {
         self.uncertainty = Some(uncertainty);
         self
     }
 
-    /// For how long a run is repeated, for its best time: 20 ms by default. One that takes longer is done once.
+    /// Sets for how long a run is repeated to find its best time: 20 ms by default. A run that takes longer is made
+    /// once.
     #[must_use]
     pub fn repeat_for(mut self, duration: Duration) -> Self {
         self.repeat_for = duration;
         self
     }
 
-    /// What charts show to the right, and what the front is of: the time, by default.
+    /// Sets the measure of cost for charts and for the Pareto front: the computing time, by default.
     #[must_use]
     pub fn against(mut self, cost: Cost) -> Self {
         self.cost = cost;
         self
     }
 
-    /// The title of charts.
+    /// Sets the title of charts.
     #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
     }
 
-    /// Says on standard error how far it is, and how many runs of each curve were done.
+    /// Reports the progress on standard error, with the number of runs of each curve.
     #[must_use]
     pub fn progress(mut self) -> Self {
         self.progress = true;
@@ -280,10 +289,12 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
 
     /// Makes all runs, one after the other so that none disturbs the time of another, and repeats them in turn.
     ///
-    /// A run that fails is kept as a point without figures, with its error ([`Point::outcome`]); the others are made all the same.
+    /// A run that fails is kept as a point without numbers, with its error ([`Point::outcome`]); the other runs are
+    /// made nevertheless.
     ///
     /// # Errors
-    /// [`WorkPrecisionError`] where elements, steps, span, start or reference allow no run at all.
+    /// [`WorkPrecisionError`] if elements, step sizes, span, start or reference are invalid, so that no run is
+    /// possible.
     pub fn run(&self) -> Result<Measurements, WorkPrecisionError> {
         let grids = self.grids()?;
         self.check_start(&grids)?;

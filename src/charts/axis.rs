@@ -3,13 +3,13 @@
 use super::error::ChartError;
 use std::ops::Range;
 
-/// How numbers are laid along an axis.
+/// The scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Scale {
-    /// Equal differences are equal lengths.
+    /// Linear: equal differences have equal lengths.
     #[default]
     Linear,
-    /// Equal ratios are equal lengths; numbers that are not positive have no place.
+    /// Logarithmic: equal ratios have equal lengths; numbers that are not positive cannot be shown.
     Logarithmic,
 }
 
@@ -22,7 +22,7 @@ impl Scale {
 
 /// An axis: its label with the unit, its scale, its range.
 ///
-/// A label alone is a linear axis whose range fits what is drawn.
+/// A label alone makes a linear axis whose range fits the data.
 ///
 /// ```
 /// use tfe::charts::{Axis, Scale};
@@ -47,14 +47,15 @@ impl Axis {
         }
     }
 
-    /// With this scale.
+    /// Sets the scale.
     #[must_use]
     pub fn scale(mut self, scale: Scale) -> Self {
         self.scale = scale;
         self
     }
 
-    /// From `range.start` to `range.end`, ascending; what lies outside is cut off. Positive on a logarithmic axis.
+    /// Sets the range from `range.start` to `range.end`, ascending, and positive on a logarithmic axis. What lies
+    /// outside is cut off.
     #[must_use]
     pub fn range(mut self, range: Range<f64>) -> Self {
         self.range = Some(range);

@@ -16,7 +16,8 @@ impl Colour {
     /// Of the grid.
     pub(super) const LIGHT_GREY: Self = Self(228, 228, 228);
 
-    /// The k-th of eight colours, those of Okabe and Ito with a wine red for their yellow, which is not seen on white; then from the first again.
+    /// The k-th of eight colours, then from the first again. They are those of Okabe and Ito, which can be told apart
+    /// with colour blindness, with a wine red in place of their yellow, which is hardly visible on white.
     pub fn of_series(k: usize) -> Self {
         const PALETTE: [Colour; 8] = [
             Colour(0, 114, 178),

@@ -17,7 +17,7 @@ pub enum ChartError {
         /// What the file system said.
         source: io::Error,
     },
-    /// The ending of the file name is none that can be written.
+    /// The ending of the file name is not one of the supported formats.
     UnknownEnding {
         /// Which file.
         path: PathBuf,
@@ -26,7 +26,7 @@ pub enum ChartError {
     },
     /// There is nothing to draw: no point, or no cell, has finite numbers.
     NoData,
-    /// A range was asked for whose ends are not finite or not ascending.
+    /// The ends of a range are not finite or not ascending.
     Range {
         /// The label of the axis.
         axis: String,
@@ -35,12 +35,12 @@ pub enum ChartError {
         /// The end asked for.
         end: f64,
     },
-    /// A logarithmic axis would begin at or below zero: by its range, or for want of a positive number.
+    /// A logarithmic axis would begin at or below zero: because of its range, or because no number is positive.
     NotPositive {
         /// The label of the axis.
         axis: String,
     },
-    /// The picture would have more cells than fit into one.
+    /// The picture would have more cells than one picture can hold.
     TooManyCells {
         /// Cells in a row.
         columns: usize,

@@ -16,9 +16,9 @@ use std::path::Path;
 /// A class of cells, such as “stable”.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Class {
-    /// What the legend says.
+    /// The name of the class, for the legend.
     pub name: String,
-    /// Its colour.
+    /// The colour of the class.
     pub colour: Colour,
 }
 
@@ -45,10 +45,11 @@ struct Curve {
     points: Vec<Point>,
 }
 
-/// A rectangle of cells over two axes: a value in each, shown by a colour scale, or a class.
+/// A map: a rectangle of cells over two axes, each with a value, shown by a colour scale, or with a class.
 ///
-/// Column 0 is at the left, row 0 at the bottom; cells are equally wide along their axes, logarithmic ones included. The cells are one
-/// image of a byte a cell inside the SVG, so that a map of a million cells is a file of at most about a megabyte.
+/// Column 0 is at the left, row 0 at the bottom; cells are equally wide along their axes, also on logarithmic ones.
+/// The cells are one image inside the SVG with one byte for each cell, so that a map of a million cells is a file of
+/// at most about a megabyte.
 ///
 /// ```
 /// use tfe::charts::{Axis, HeatMap};
@@ -92,7 +93,8 @@ impl HeatMap {
     /// The `endings` that [`HeatMap::save`] knows.
     const ENDINGS: &'static [&'static str] = &[".svg", ".png", ".csv"];
 
-    /// A map of values: (columns, rows), and what is in column i and row j. A cell with `None`, or with what is not finite, is grey.
+    /// A map of values, of the size (columns, rows); the function returns the value in column i and row j. A cell with
+    /// `None`, or with a value that is not finite, is grey.
     pub fn new(
         title: impl Into<String>,
         size: (usize, usize),
@@ -101,8 +103,8 @@ impl HeatMap {
         Self::of(title.into(), size, Cells::Values(filled(size, value)))
     }
 
-    /// A map of classes: (columns, rows), the classes, at most 255 of them, and the index of the class of column i and row j. A cell with `None`, or with
-    /// an index beyond the classes, is grey.
+    /// A map of classes: its size (columns, rows), the classes, at most 255, and a function for the index of the class
+    /// in column i and row j. A cell with `None`, or with an index that is not one of a class, is grey.
     ///
     /// ```
     /// use tfe::charts::{Class, Colour, HeatMap};
@@ -145,22 +147,25 @@ impl HeatMap {
         }
     }
 
-    /// The horizontal axis. Its range is that of the cells, edge to edge; without one columns are counted from 0.
+    /// Sets the horizontal axis, whose range is that of the cells, edge to edge. Without a range, columns are counted
+    /// from 0.
     #[must_use]
     pub fn x(mut self, axis: impl Into<Axis>) -> Self {
         self.x = axis.into();
         self
     }
 
-    /// The vertical axis. Its range is that of the cells, edge to edge; without one rows are counted from 0.
+    /// Sets the vertical axis, whose range is that of the cells, edge to edge. Without a range, rows are counted from
+    /// 0.
     #[must_use]
     pub fn y(mut self, axis: impl Into<Axis>) -> Self {
         self.y = axis.into();
         self
     }
 
-    /// The axis of the colours: label, scale, range. Values outside the range have the colour of its nearer end. On a logarithmic one, values that are
-    /// not positive have the colour of the least. Maps of classes have none.
+    /// Sets the axis of the colours: label, scale, range. Values outside the range have the colour of the nearer end;
+    /// on a logarithmic axis, values that are not positive have the colour of the smallest. Maps of classes have no
+    /// such axis.
     #[must_use]
     pub fn values(mut self, axis: impl Into<Axis>) -> Self {
         self.values = axis.into();
@@ -181,7 +186,8 @@ impl HeatMap {
         self
     }
 
-    /// Width and height of the picture, in pixels, each from 240 to 8000; what is outside counts as the nearer end.
+    /// Sets the width and height of the picture, in pixels, each from 240 to 8000; values outside are replaced by the
+    /// nearer end.
     #[must_use]
     pub fn size(mut self, width: u32, height: u32) -> Self {
         self.size = sides(width, height);
@@ -191,8 +197,8 @@ impl HeatMap {
     /// The map as an SVG picture.
     ///
     /// # Errors
-    /// [`ChartError::NoData`] without a cell, or without a finite value where they decide the range of the colours; [`ChartError::TooManyCells`];
-    /// [`ChartError::Range`] and [`ChartError::NotPositive`] for an axis that cannot be.
+    /// [`ChartError::NoData`] if there are no cells, or no finite value to determine the range of the colours;
+    /// [`ChartError::TooManyCells`]; [`ChartError::Range`] and [`ChartError::NotPositive`] for an invalid axis.
     pub fn to_svg(&self) -> Result<String, ChartError> {
         let (x, y) = self.extents()?;
         let bar = self.colour_bar()?;
@@ -228,7 +234,7 @@ impl HeatMap {
         })
     }
 
-    /// The cells as a PNG image, a pixel each, without axes; the top row is the last.
+    /// The cells as a PNG image with one pixel for each cell, without axes; the last row is at the top.
     ///
     /// # Errors
     /// Those of [`HeatMap::to_svg`] for cells and colours.
@@ -257,7 +263,8 @@ impl HeatMap {
         image::encode((self.columns, self.rows), &palette, &pixels)
     }
 
-    /// The cells as text: a header, then x, y and value of each, row by row from the bottom, at the cells' centres. An empty field where there is no value.
+    /// The cells as CSV: a header, then x, y and value at the centre of each cell, row by row from the bottom. Without
+    /// a value, the field is empty.
     ///
     /// # Errors
     /// Those of [`HeatMap::to_svg`] for cells and axes.
@@ -288,10 +295,11 @@ impl HeatMap {
         }
     }
 
-    /// Writes the picture into a file `.svg`, the cells as pixels into a file `.png`, or as numbers (x, y, value) into a file `.csv`.
+    /// Writes a file: the picture as `.svg`, the cells as pixels in a `.png`, or as numbers (x, y, value) in a `.csv`.
     ///
     /// # Errors
-    /// Those of [`HeatMap::to_svg`]; [`ChartError::UnknownEnding`]; [`ChartError::Io`].
+    /// Those of [`HeatMap::to_svg`]; [`ChartError::UnknownEnding`] for another ending; [`ChartError::Io`] if the file
+    /// cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), ChartError> {
         let path = path.as_ref();
         match ending(path, Self::ENDINGS)? {

@@ -19,7 +19,7 @@ pub enum Style {
     LineWithMarkers,
     /// A marker at every point.
     Markers,
-    /// A grey dashed line, for what others are compared with.
+    /// A grey dashed line, for a reference with which others are compared.
     Reference,
 }
 
@@ -30,10 +30,11 @@ struct Series {
     points: Vec<Point>,
 }
 
-/// Curves in a frame with two axes.
+/// A line chart: curves in a frame with two axes.
 ///
-/// A point with a coordinate that is not finite, or not positive on a logarithmic axis, is a gap in its curve, a point between two gaps a dot; what lies
-/// outside a range is cut off at the frame. The legend stands beside the frame. Colours are told apart by the colour-blind, markers without colours.
+/// A point with a coordinate that is not finite, or not positive on a logarithmic axis, makes a gap in its curve; a
+/// single point between two gaps is a dot. What lies outside a range is cut off at the frame. The legend is beside the
+/// frame. The colours can be told apart with colour blindness, the markers without colours.
 ///
 /// ```
 /// use tfe::charts::{Axis, Chart, Style};
@@ -81,14 +82,14 @@ impl Chart {
         }
     }
 
-    /// The horizontal axis: a label, or an [`Axis`].
+    /// Sets the horizontal axis: a label, or an [`Axis`].
     #[must_use]
     pub fn x(mut self, axis: impl Into<Axis>) -> Self {
         self.x = axis.into();
         self
     }
 
-    /// The vertical axis.
+    /// Sets the vertical axis: a label, or an [`Axis`].
     #[must_use]
     pub fn y(mut self, axis: impl Into<Axis>) -> Self {
         self.y = axis.into();
@@ -105,7 +106,7 @@ impl Chart {
         self.series(name, Style::Line, points)
     }
 
-    /// Adds a series of points (x, y) in this style. One without a name is not in the legend.
+    /// Adds a series of points (x, y) in a style. A series with an empty name is not in the legend.
     #[must_use]
     pub fn series(
         mut self,
@@ -121,7 +122,8 @@ impl Chart {
         self
     }
 
-    /// Width and height of the picture, in pixels, each from 240 to 8000; what is outside counts as the nearer end.
+    /// Sets the width and height of the picture, in pixels, each from 240 to 8000; values outside are replaced by the
+    /// nearer end.
     #[must_use]
     pub fn size(mut self, width: u32, height: u32) -> Self {
         self.size = sides(width, height);
@@ -131,7 +133,8 @@ impl Chart {
     /// The chart as an SVG picture.
     ///
     /// # Errors
-    /// [`ChartError::NoData`] without a finite point; [`ChartError::Range`] and [`ChartError::NotPositive`] for an axis that cannot be.
+    /// [`ChartError::NoData`] if no point is finite; [`ChartError::Range`] and [`ChartError::NotPositive`] for an
+    /// invalid axis.
     pub fn to_svg(&self) -> Result<String, ChartError> {
         let points = self.points_to_fit();
         if points.is_empty() {
@@ -162,10 +165,11 @@ impl Chart {
         })
     }
 
-    /// Writes the picture into a file `.svg`, or the points (series, x, y) into a file `.csv`.
+    /// Writes a file: the picture as `.svg`, or the points (series, x, y) as `.csv`.
     ///
     /// # Errors
-    /// Those of [`Chart::to_svg`]; [`ChartError::UnknownEnding`]; [`ChartError::Io`].
+    /// Those of [`Chart::to_svg`]; [`ChartError::UnknownEnding`] for another ending; [`ChartError::Io`] if the file
+    /// cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), ChartError> {
         let path = path.as_ref();
         match ending(path, &[".svg", ".csv"])? {
@@ -174,7 +178,7 @@ impl Chart {
         }
     }
 
-    /// The points as text: a header, then series, x and y of each. A number that is not finite is an empty field.
+    /// The points as CSV: a header, then series, x and y of each point. A number that is not finite is an empty field.
     pub fn to_csv(&self) -> String {
         let mut text = String::from("series,x,y\n");
         for series in &self.series {

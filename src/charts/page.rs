@@ -60,8 +60,10 @@ impl Section {
         self
     }
 
-    /// Adds an SVG picture, such as one of [`Chart::to_svg`](super::Chart::to_svg), with a caption. The picture goes into the page as it is: it must be one
-    /// `<svg>` element, and one of a stranger may hold scripts. Pictures of this module have no `id`s, so that they do not get into each other's way.
+    /// Adds an SVG picture, such as one of [`Chart::to_svg`](super::Chart::to_svg), with a caption.
+    ///
+    /// The picture must be one `<svg>` element and goes into the page unchanged; a picture from an unknown source may
+    /// contain scripts. Pictures of this module have no `id`s, so that they do not interfere with each other.
     #[must_use]
     pub fn figure(mut self, svg: impl Into<String>, caption: impl Into<String>) -> Self {
         self.parts.push(Part::Figure {
@@ -72,7 +74,7 @@ impl Section {
     }
 }
 
-/// A page of HTML that needs no other file: sections with a table of contents.
+/// An HTML page that needs no other file: sections with a table of contents.
 ///
 /// ```
 /// use tfe::charts::{Chart, Page, Section};
@@ -126,7 +128,7 @@ impl Page {
     /// The page as HTML.
     ///
     /// # Errors
-    /// [`ChartError::NotSvg`] where a figure does not begin and end as an `<svg>` element.
+    /// [`ChartError::NotSvg`] if a figure is not an `<svg>` element from its beginning to its end.
     pub fn to_html(&self) -> Result<String, ChartError> {
         let title = escaped(&self.title);
         let mut html = format!(
@@ -147,10 +149,11 @@ impl Page {
         Ok(html)
     }
 
-    /// Writes the page into a file `.html`.
+    /// Writes the page as a file `.html`.
     ///
     /// # Errors
-    /// Those of [`Page::to_html`]; [`ChartError::UnknownEnding`]; [`ChartError::Io`].
+    /// Those of [`Page::to_html`]; [`ChartError::UnknownEnding`] for another ending; [`ChartError::Io`] if the file
+    /// cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), ChartError> {
         let path = path.as_ref();
         ending(path, &[".html", ".htm"])?;

@@ -17,7 +17,7 @@ pub enum WorkPrecisionError {
     NoElements,
     /// No step was given.
     NoSteps,
-    /// An element does not exist (number of nodes, quadrature).
+    /// An element does not exist: an impossible number of nodes, or a quadrature that its family does not have.
     Element(ElementError),
     /// The span is empty, or its ends are not finite.
     Span {
@@ -26,7 +26,7 @@ pub enum WorkPrecisionError {
         /// The end asked for.
         end: f64,
     },
-    /// A step is zero, infinite or not a number.
+    /// A step size is zero, infinite or not a number.
     Step {
         /// The step asked for.
         step: f64,
@@ -38,16 +38,16 @@ pub enum WorkPrecisionError {
         /// The step asked for.
         step: f64,
     },
-    /// No run begins at this start.
+    /// No run can begin at this start.
     Start(RunErrorKind),
-    /// The run that others should be compared with stopped, however short its steps.
+    /// The reference run failed with every step size.
     ReferenceRun(RunErrorKind),
     /// The reference that was given is not finite.
     ReferenceValue {
         /// At which time.
         time: f64,
     },
-    /// A vector of the reference that was given is not as long as the model.
+    /// The length of a vector of the reference that was given differs from that of the model.
     ReferenceLength {
         /// `q` or `p`.
         vector: &'static str,
@@ -122,7 +122,7 @@ pub enum SaveError {
         /// What the file system said.
         source: io::Error,
     },
-    /// The ending of the file name is none that can be written.
+    /// The ending of the file name is not one of the supported formats.
     UnknownEnding {
         /// Which file.
         path: PathBuf,

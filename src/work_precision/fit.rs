@@ -2,17 +2,18 @@
 
 use crate::numbers::larger;
 
-/// The power of the step by which the error falls.
+/// The observed order of convergence: the power k of the step size h by which the error e falls.
 ///
-/// Least squares in the logarithms, log e = c + k log h, over the points that are a power: below a tenth of the scale, well above the
-/// [floor](super::Curve::floor) and above the uncertainty of the reference; the coarsest of them are left out while the line does not fit.
+/// It is fitted by least squares to the logarithms, log e = c + k log h, over the points that follow a power law:
+/// below a tenth of the scale, well above the [floor](super::Curve::floor) and above the uncertainty of the reference.
+/// The coarsest of them are left out until the line fits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slope {
     /// The exponent k of error ~ hᵏ.
     pub exponent: f64,
-    /// How many points it rests on. Two are a quotient rather than a fit.
+    /// The number of points of the fit. With two, the exponent is a quotient rather than a fit.
     pub points: usize,
-    /// The largest distance of a point from the line, in decades.
+    /// The largest distance of a point from the line, in powers of ten.
     pub residual: f64,
 }
 

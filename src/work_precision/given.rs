@@ -6,8 +6,8 @@ use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::{Model, State};
 
 impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, State<N>> {
-    /// What runs are compared with: the exact (q, p) at any time of the span. Its uncertainty counts as one rounding, unless
-    /// [`reference_uncertainty`](Self::reference_uncertainty) says more.
+    /// Sets the reference: the exact (q, p) at any time of the span. Its relative error is assumed to be the rounding
+    /// unit, unless [`reference_uncertainty`](Self::reference_uncertainty) is called.
     #[must_use]
     pub fn reference(mut self, exact: impl Fn(f64) -> ([f64; N], [f64; N]) + 'm) -> Self {
         self.source = Source::Function(Box::new(move |time| {
@@ -17,7 +17,7 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, State<N>> {
         self
     }
 
-    /// What runs are compared with: the exact state at the end of the span, and nothing between.
+    /// Sets the reference: the exact state at the end of the span only.
     #[must_use]
     pub fn reference_end(mut self, q: [f64; N], p: [f64; N]) -> Self {
         self.source = Source::End(State { q, p });
@@ -26,10 +26,12 @@ impl<'m, M: Model<N>, const N: usize> WorkPrecision<'m, M, State<N>> {
 }
 
 impl<'m, M: family::Model> WorkPrecision<'m, M, FamilyState> {
-    /// What runs are compared with: the exact (q, p) at any time of the span, vectors as long as the model. Its uncertainty counts as one
-    /// rounding, unless [`reference_uncertainty`](Self::reference_uncertainty) says more.
+    /// Sets the reference: the exact (q, p) at any time of the span, as vectors of the model's length. Its relative
+    /// error is assumed to be the rounding unit, unless [`reference_uncertainty`](Self::reference_uncertainty) is
+    /// called.
     ///
-    /// Vectors of another length are [`WorkPrecisionError::ReferenceLength`](super::WorkPrecisionError::ReferenceLength) when it is run.
+    /// If a vector has another length, the run returns
+    /// [`WorkPrecisionError::ReferenceLength`](super::WorkPrecisionError::ReferenceLength).
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -63,9 +65,10 @@ impl<'m, M: family::Model> WorkPrecision<'m, M, FamilyState> {
         self
     }
 
-    /// What runs are compared with: the exact state at the end of the span, vectors as long as the model, and nothing between.
+    /// Sets the reference: the exact state at the end of the span only, as vectors of the model's length.
     ///
-    /// Vectors of another length are [`WorkPrecisionError::ReferenceLength`](super::WorkPrecisionError::ReferenceLength) when it is run.
+    /// If a vector has another length, the run returns
+    /// [`WorkPrecisionError::ReferenceLength`](super::WorkPrecisionError::ReferenceLength).
     #[must_use]
     pub fn reference_end(mut self, q: impl Into<Vec<f64>>, p: impl Into<Vec<f64>>) -> Self {
         let (q, p) = (q.into(), p.into());

@@ -35,49 +35,51 @@ impl Curve {
         self.element
     }
 
-    /// How its equations were solved.
+    /// How the equations of the element were solved.
     pub fn solve(&self) -> Solve {
         self.solve
     }
 
-    /// All runs, those that failed included, the longest step first.
+    /// All runs, including those that failed, the longest step first.
     pub fn points(&self) -> &[Point] {
         &self.points
     }
 
-    /// The runs that reached their end: step and what was measured.
+    /// The runs that reached the end of the span: step size and measurements.
     pub fn measured(&self) -> impl Iterator<Item = (f64, &Measured)> {
         let points = self.points.iter();
         points.filter_map(|point| Some((point.step, point.measured()?)))
     }
 
-    /// How many runs failed.
+    /// The number of runs that failed.
     pub fn failed(&self) -> usize {
         self.points.len() - self.measured().count()
     }
 
-    /// By which power of the step the error at the end falls, the larger one of coordinates and momenta; `None` where fewer than two
-    /// points are a power.
+    /// The observed order: the power of the step size by which the error at the end falls, where the error is the
+    /// larger one of coordinates and momenta. `None` if fewer than two points follow a power law.
     pub fn slope(&self) -> Option<Slope> {
         self.slope_of(Measured::error)
     }
 
-    /// The same of the coordinates alone.
+    /// The observed order of the coordinates alone.
     pub fn slope_q(&self) -> Option<Slope> {
         self.slope_of(|measured| measured.error_q)
     }
 
-    /// The same of the momenta alone.
+    /// The observed order of the momenta alone.
     pub fn slope_p(&self) -> Option<Slope> {
         self.slope_of(|measured| measured.error_p)
     }
 
-    /// The error that shorter steps do not improve, if the steps are short enough to show it.
+    /// The error that shorter steps do not improve (rounding, iteration); `None` if no step was short enough to show
+    /// it.
     pub fn floor(&self) -> Option<f64> {
         fit::floor(&self.errors(Measured::error))
     }
 
-    /// The fastest run with an error of at most `error`. Below the uncertainty of the reference there is none.
+    /// The fastest run with an error of at most `error`; `None` if there is none, or `error` is below the uncertainty
+    /// of the reference.
     pub fn fastest(&self, error: f64) -> Option<&Point> {
         cheapest(self.points.iter(), error, self.uncertainty, Cost::Time)
     }
@@ -92,7 +94,8 @@ impl Curve {
     }
 }
 
-/// What a [`WorkPrecision`](super::WorkPrecision) measured: curves of points, the reference, and the points that no other beats.
+/// The measurements of a [`WorkPrecision`](super::WorkPrecision): curves of points, the reference, and the Pareto
+/// front.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measurements {
     pub(super) title: String,
@@ -109,7 +112,7 @@ impl Measurements {
         &self.curves
     }
 
-    /// All runs, those that failed included, curve by curve.
+    /// All runs, including those that failed, curve by curve.
     pub fn points(&self) -> impl Iterator<Item = &Point> {
         self.curves.iter().flat_map(|curve| &curve.points)
     }
@@ -124,26 +127,26 @@ impl Measurements {
         &self.peers
     }
 
-    /// What errors were measured against.
+    /// The reference against which errors were measured.
     pub fn reference(&self) -> &Reference {
         &self.reference
     }
 
-    /// With another cost to the right of charts, and in the front.
+    /// Changes the measure of cost for charts and for the Pareto front.
     #[must_use]
     pub fn against(mut self, cost: Cost) -> Self {
         self.cost = cost;
         self
     }
 
-    /// With another title.
+    /// Changes the title.
     #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
     }
 
-    /// Some of the curves, for a chart of their own; those of other integrators stay.
+    /// The measurements with only some of the curves, for a chart of their own; the curves of other integrators stay.
     #[must_use]
     pub fn only(&self, wanted: impl Fn(&Curve) -> bool) -> Self {
         let curves = self.curves.iter().filter(|curve| wanted(curve));
@@ -155,14 +158,15 @@ impl Measurements {
         }
     }
 
-    /// The same without the other integrators.
+    /// The measurements without the other integrators.
     #[must_use]
     pub fn without_peers(mut self) -> Self {
         self.peers.clear();
         self
     }
 
-    /// The Pareto front of our runs: those for which no other has both a smaller error and a smaller cost, the cheapest first.
+    /// The Pareto front of the elements: the runs for which no other has both a smaller error and a smaller cost, the
+    /// cheapest first.
     ///
     /// An error below the uncertainty of the reference counts as that uncertainty.
     pub fn front(&self) -> Vec<&Point> {
@@ -175,8 +179,8 @@ impl Measurements {
         pareto(all).into_iter().map(|(_, _, point)| point).collect()
     }
 
-    /// The cheapest run with an error of at most `error`. Below the uncertainty of the reference there is none: no run can be told to
-    /// be that good.
+    /// The cheapest run with an error of at most `error`; `None` if there is none, or if `error` is below the
+    /// uncertainty of the reference, because such an error cannot be measured.
     pub fn fastest(&self, error: f64) -> Option<&Point> {
         let uncertainty = self.reference.uncertainty();
         cheapest(self.points(), error, uncertainty, self.cost)
@@ -195,7 +199,8 @@ impl Measurements {
         front.into_iter().map(known).collect()
     }
 
-    /// The cheapest run of another integrator with an error of at most `error`, as [`fastest`](Self::fastest) finds ours.
+    /// The cheapest run of another integrator with an error of at most `error`; like [`fastest`](Self::fastest) for
+    /// the elements.
     pub fn fastest_peer(&self, error: f64) -> Option<(&Peer, &PeerPoint)> {
         if error < self.reference.uncertainty() {
             return None;

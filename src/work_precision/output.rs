@@ -18,19 +18,21 @@ constraint_position,constraint_velocity,seconds,repetitions,steps,iterations,fix
 residual_evaluations,tangent_evaluations,factorizations,at_reference_floor,on_front,failure\n";
 
 impl Measurements {
-    /// Writes a chart into a file `.svg` (error against cost, both logarithmic), all figures into a file `.csv`, chart and table into a
-    /// page `.html`.
+    /// Writes a file: a chart (error against cost, both logarithmic) as `.svg`, all numbers as `.csv`, or chart and
+    /// table as a page `.html`.
     ///
     /// # Errors
-    /// [`SaveError::UnknownEnding`]; [`SaveError::Io`]; [`SaveError::NoCharts`] for pictures without the feature `charts`;
-    /// [`SaveError::Chart`] where there is nothing to draw.
+    /// [`SaveError::UnknownEnding`] for another ending, [`SaveError::Io`] if the file cannot be written,
+    /// [`SaveError::NoCharts`] for pictures without the feature `charts`, [`SaveError::Chart`] if there is nothing to
+    /// draw.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), SaveError> {
         self.save_as(path.as_ref())
     }
 
-    /// All points as text: a header, then a line for each, those that failed with their error in the last column. Numbers read back
-    /// exactly; what is not finite, or was not measured, is an empty field. Other integrators follow: the name as the element, `peer` as
-    /// the solver, the setting as the step, evaluations as those of the residual.
+    /// All points as CSV: a header, then one line for each run; runs that failed have their error in the last column.
+    /// Numbers read back exactly; a value that is not finite, or was not measured, is an empty field. Runs of other
+    /// integrators follow, with their name as the element, `peer` as the solver, their setting as the step, and their
+    /// evaluations as those of the residual.
     pub fn to_csv(&self) -> String {
         let front = self.front();
         let mut text = String::from(HEADER);

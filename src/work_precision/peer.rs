@@ -8,14 +8,15 @@ use crate::numbers::larger;
 use std::error::Error;
 use std::time::Duration;
 
-/// What another integrator says of one run, see [`WorkPrecision::peer`](super::WorkPrecision::peer); `S` is the type of the model's states.
+/// The result of one run of another integrator, see [`WorkPrecision::peer`](super::WorkPrecision::peer); `S` is the
+/// type of the model's states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeerRun<S> {
-    /// Where it ended.
+    /// The state at the end of the span.
     pub end: S,
-    /// How long the run took, without what comes before its first step.
+    /// The time of the run, without its preparation before the first step.
     pub time: Duration,
-    /// How often it evaluated the equations; zero where nothing counts them.
+    /// The number of evaluations of the equations of motion; zero if they are not counted.
     pub evaluations: u64,
 }
 
@@ -29,41 +30,41 @@ pub struct Peer {
 /// One run of another integrator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PeerPoint {
-    /// Its tolerance, or its step.
+    /// The setting: its tolerance, or its step size.
     pub setting: f64,
-    /// What was measured, or what the integrator said when it stopped.
+    /// The measurements, or the message of the integrator if it failed.
     pub outcome: Result<PeerMeasured, String>,
 }
 
-/// What was measured of another integrator's run, as in [`Measured`](super::Measured).
+/// The measurements of a run of another integrator, as in [`Measured`](super::Measured).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeerMeasured {
     /// Error of the coordinates at the end of the span.
     pub error_q: f64,
     /// Error of the momenta at the end of the span.
     pub error_p: f64,
-    /// Seconds, the least of all repetitions.
+    /// The time of the steps in seconds, the shortest of all repetitions.
     pub seconds: f64,
-    /// How often the run was repeated for that.
+    /// The number of repetitions.
     pub repetitions: u32,
-    /// Evaluations of the equations; zero where nothing counts them.
+    /// The number of evaluations of the equations of motion; zero if they are not counted.
     pub evaluations: u64,
     /// Whether the error is no larger than the uncertainty of the reference.
     pub at_reference_floor: bool,
 }
 
 impl Peer {
-    /// The name.
+    /// The name of the integrator.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// All runs, those that failed included.
+    /// All runs, including those that failed.
     pub fn points(&self) -> &[PeerPoint] {
         &self.points
     }
 
-    /// How many runs failed.
+    /// The number of runs that failed.
     pub fn failed(&self) -> usize {
         let failed = |point: &&PeerPoint| point.outcome.is_err();
         self.points.iter().filter(failed).count()
@@ -71,7 +72,7 @@ impl Peer {
 }
 
 impl PeerPoint {
-    /// What was measured, if the run reached its end.
+    /// The measurements, if the run reached the end of the span.
     pub fn measured(&self) -> Option<&PeerMeasured> {
         self.outcome.as_ref().ok()
     }
@@ -83,7 +84,7 @@ impl PeerMeasured {
         larger(self.error_q, self.error_p)
     }
 
-    /// What it cost; `None` where peers do not count it.
+    /// The cost of the run; `None` in a measure that is not counted for other integrators.
     pub fn cost(&self, cost: Cost) -> Option<f64> {
         match cost {
             Cost::Time => Some(self.seconds),

@@ -4,17 +4,17 @@ use crate::error::RunErrorKind;
 use crate::numbers::larger;
 use tfe_runtime::{Element, Solve, Statistics};
 
-/// What a run is charged with.
+/// A measure of the cost of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Cost {
-    /// Seconds.
+    /// The computing time in seconds.
     #[default]
     Time,
-    /// Calls of the kernels of first and of second derivatives together.
+    /// The number of calls of the kernels of first and of second derivatives together.
     Evaluations,
-    /// Iterations inside the elements.
+    /// The number of iterations inside elements.
     Iterations,
-    /// Steps.
+    /// The number of steps.
     Steps,
 }
 
@@ -36,41 +36,46 @@ impl Cost {
 pub struct Point {
     /// The element.
     pub element: Element,
-    /// How its equations were solved.
+    /// How the equations of the element were solved.
     pub solve: Solve,
-    /// The step, in the units of time, positive; the span where a longer one was asked for.
+    /// The step size, in units of time, positive; not more than the span.
     pub step: f64,
-    /// The tolerance of its iteration.
+    /// The tolerance of the iteration inside elements.
     pub tolerance: f64,
-    /// What was measured, or why the run stopped.
+    /// The measurements, or why the run stopped.
     pub outcome: Result<Measured, RunErrorKind>,
 }
 
-/// What was measured of a run that reached its end. Errors are relative to the largest |q| and the largest |p| of the reference.
+/// The measurements of a run that reached the end of the span. Errors are relative to the largest |q| and the largest
+/// |p| of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// Error of the coordinates at the end of the span.
     pub error_q: f64,
     /// Error of the momenta at the end of the span.
     pub error_p: f64,
-    /// The largest error of the coordinates at up to ten nodes, equally spaced as far as the step allows, the end included.
+    /// The largest error of the coordinates at up to ten nodes, equally spaced as far as the steps allow, including
+    /// the end.
     pub max_error_q: f64,
-    /// The same of the momenta.
+    /// The largest error of the momenta at the same nodes.
     pub max_error_p: f64,
-    /// The largest change of the energy H = p·v − L, relative to that at the start (absolute where that is zero, or not more than a rounding beside p·v), at no
-    /// more than about a thousand nodes, as [`Motion::energy_error`](crate::Motion::energy_error) tells it. Of a model that is forced, damped or depends on time it measures physics, not error.
+    /// The largest change of the energy H = p·v − L at up to about a thousand nodes, relative to the energy at the
+    /// start (absolute if that is zero, or no more than a rounding error of p·v), as
+    /// [`Motion::energy_error`](crate::Motion::energy_error). For a model that is forced, damped or depends on time it
+    /// is a property of the motion and not an error.
     pub energy_error: f64,
-    /// max |φ| of the holonomic constraints at the same nodes; zero without any.
+    /// The largest violation max |φ| of the holonomic constraints at the same nodes; zero without constraints.
     pub constraint_position: f64,
-    /// max |A v + a| of all constraints at the same nodes; zero without any.
+    /// The largest violation max |A v + a| of all constraints at the same nodes; zero without constraints.
     pub constraint_velocity: f64,
-    /// Seconds that the steps took, the least of all repetitions.
+    /// The time of the steps in seconds, the shortest of all repetitions.
     pub seconds: f64,
-    /// How often the run was repeated for that.
+    /// The number of repetitions.
     pub repetitions: u32,
-    /// Steps, iterations, evaluations, factorisations of one run.
+    /// Counts of steps, iterations, evaluations and factorisations of one run.
     pub statistics: Statistics,
-    /// Whether the error at the end is no larger than the uncertainty of the reference: the run may be better than it looks, or worse.
+    /// Whether the error at the end is no larger than the uncertainty of the reference, so that the true error may be
+    /// smaller or larger.
     pub at_reference_floor: bool,
 }
 
@@ -80,7 +85,7 @@ impl Measured {
         larger(self.error_q, self.error_p)
     }
 
-    /// What it cost.
+    /// The cost in a given measure.
     pub fn cost(&self, cost: Cost) -> f64 {
         let count = match cost {
             Cost::Time => return self.seconds,
@@ -95,7 +100,7 @@ impl Measured {
 }
 
 impl Point {
-    /// What was measured, if the run reached its end.
+    /// The measurements, if the run reached the end of the span.
     pub fn measured(&self) -> Option<&Measured> {
         self.outcome.as_ref().ok()
     }

@@ -10,16 +10,16 @@ use std::fmt;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Solve};
 
-/// How the reference was found, and how well it is known.
+/// The reference of a comparison: how it was found, and how accurate it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Reference {
-    /// It was given.
+    /// It was given by the caller.
     Given {
         /// Its relative error, as it was given; else one rounding.
         uncertainty: f64,
     },
-    /// A run with a fine step, checked against one of twice the step.
+    /// It is a run with short steps, checked against one with steps twice as long.
     Computed {
         /// The element.
         element: Element,
@@ -32,7 +32,7 @@ pub enum Reference {
 }
 
 impl Reference {
-    /// The relative error of the reference at the end of the span: smaller errors of runs mean nothing.
+    /// The relative error of the reference at the end of the span. Smaller errors of runs cannot be measured.
     pub fn uncertainty(&self) -> f64 {
         match self {
             Self::Given { uncertainty } | Self::Computed { uncertainty, .. } => *uncertainty,

@@ -13,7 +13,8 @@ use tfe_runtime::legendre;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{Element, Form, Model, State, Statistics, StepError};
 
-/// A state as numbers: [`State`] of models of fixed size, [`FamilyState`] of those of run-time length.
+/// A state that can be read as numbers: [`State`] for models of fixed size, [`FamilyState`] for those of run-time
+/// length.
 pub trait PhasePoint: Clone {
     /// The coordinates.
     fn q(&self) -> &[f64];
@@ -41,10 +42,10 @@ impl PhasePoint for FamilyState {
     }
 }
 
-/// A model with states of type `S` that [`WorkPrecision`](super::WorkPrecision) can measure: every [`Model`] with [`State`], every
-/// [`family::Model`] with [`FamilyState`], and nothing else.
+/// A model with states of type `S` that [`WorkPrecision`](super::WorkPrecision) can measure: every [`Model`] with
+/// [`State`], every [`family::Model`] with [`FamilyState`], and nothing else.
 ///
-/// For functions that take either:
+/// Use it as a bound in functions that take models of either kind:
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -73,7 +74,7 @@ pub trait Subject<S: PhasePoint>: Steppable<S> {}
 
 impl<M: Steppable<S>, S: PhasePoint> Subject<S> for M {}
 
-/// How a model is stepped and looked at. Not to be named outside.
+/// How a model is stepped and evaluated; internal.
 pub trait Steppable<S> {
     /// What makes the steps.
     type Stepper<'m>

@@ -10,9 +10,10 @@ use crate::work_precision::{Curve, Measurements, Point};
 const LEAST: f64 = 0.5 * f64::EPSILON;
 
 impl Measurements {
-    /// Error at the end (the larger one of coordinates and momenta) against cost, both logarithmic: a line for every curve, with its power of
-    /// the step, and for every other integrator; our front in dashes; another marker on each point below the uncertainty of the reference.
-    /// Runs that failed are counted in the legend; errors above ten are cut off.
+    /// A chart of the error at the end (the larger one of coordinates and momenta) against cost, both logarithmic: a
+    /// line for each curve with its observed order, and for each other integrator; the Pareto front of the elements as
+    /// a dashed line; a different marker at points below the uncertainty of the reference. The legend gives the number
+    /// of runs that failed; errors above ten are cut off.
     pub fn chart(&self) -> Chart {
         let logarithmic = |label: &str| Axis::new(label).scale(Scale::Logarithmic);
         let mut chart = Chart::new(&self.title)
@@ -77,10 +78,10 @@ impl Measurements {
         axis.range(0.5 * least.min(0.1 * LOST)..LOST)
     }
 
-    /// A section of a page: how it was measured, the chart, a table of the curves.
+    /// A section of a page: how the measurements were made, the chart, a table of the curves.
     ///
     /// # Errors
-    /// [`ChartError::NoData`] where no run reached its end.
+    /// [`ChartError::NoData`] if no run reached its end.
     pub fn section(&self) -> Result<Section, ChartError> {
         let failed = self.failures().count();
         let mut text = format!(
