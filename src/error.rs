@@ -32,13 +32,13 @@ pub enum RunErrorKind {
     },
     /// The accuracy asked for is not between 0 and 1.
     Accuracy {
-        /// What was asked for.
+        /// The value asked for.
         asked: f64,
     },
     /// No step size was found with which the estimated error is as small as asked. The motion in
     /// [`partial`](RunError::partial) is the best one found.
     AccuracyMissed {
-        /// What was asked for.
+        /// The value asked for.
         asked: f64,
         /// The estimated error of the motion, measured as
         /// [`Estimated::error_estimate`](crate::accuracy::Estimated::error_estimate) says, but not less than the
@@ -59,7 +59,7 @@ pub enum RunErrorKind {
     Loss {
         /// An output, the parameter by which it is differentiated, or `start`.
         name: String,
-        /// What is wrong.
+        /// The reason.
         why: &'static str,
     },
     /// The ends of the span are not finite.
@@ -106,7 +106,7 @@ pub enum RunErrorKind {
     },
     /// A coordinate or momentum of the start is not finite.
     Start {
-        /// Which coordinate.
+        /// The index of the coordinate.
         coordinate: usize,
         /// Its value.
         q: f64,
@@ -123,7 +123,7 @@ pub enum RunErrorKind {
     },
     /// An impulse acts at a time outside the span, or its time or a component is not finite.
     Impulse {
-        /// When it was to act.
+        /// The time at which it was to act.
         time: f64,
     },
     /// The call is not supported for this kind of model (see `docs/calls.md`).
@@ -137,7 +137,7 @@ pub enum RunErrorKind {
     NoEvent {
         /// The name asked for.
         name: String,
-        /// Those that there are.
+        /// The names that exist.
         known: Vec<String>,
     },
     /// Infinitely many events follow each other in a finite time, because the motion comes to rest on the surface of
@@ -153,14 +153,14 @@ pub enum RunErrorKind {
     NoParameter {
         /// The name asked for.
         name: String,
-        /// Those that there are.
+        /// The names that exist.
         known: Vec<String>,
     },
     /// A parameter was set to a number that is not finite.
     Parameter {
         /// Its name.
         name: String,
-        /// What it was set to.
+        /// The value.
         value: f64,
     },
     /// Parameters were to be changed of a model that cannot be copied with other parameters: its kernels are written
@@ -169,7 +169,7 @@ pub enum RunErrorKind {
     /// An event set parameters in a run with derivatives with respect to parameters, which cannot know how the new
     /// values depend on the old ones.
     SetUnsupported {
-        /// What was called.
+        /// The call.
         call: &'static str,
     },
     /// An event set a parameter to a value that depends on the state at the event, or on a time of the event that
@@ -194,7 +194,7 @@ pub enum RunErrorKind {
     },
     /// The call cannot be used with steps that are cut at [kinks](crate::Simulation::at_kinks).
     KinksUnsupported {
-        /// What was called.
+        /// The call.
         call: &'static str,
     },
     /// The equations of an element could not be solved.
@@ -205,7 +205,7 @@ pub enum RunErrorKind {
         time: f64,
         /// Its length.
         step: f64,
-        /// Why.
+        /// The cause.
         source: StepError,
     },
     /// An element was solved, but has no transition matrix (no derivative).
@@ -216,7 +216,7 @@ pub enum RunErrorKind {
         time: f64,
         /// Its length.
         step: f64,
-        /// Why.
+        /// The cause.
         source: TransitionError,
     },
 }
@@ -304,7 +304,7 @@ impl fmt::Display for RunErrorKind {
             Self::Element(error) => error.fmt(f),
             Self::Family(error) => error.fmt(f),
             Self::Step { step } if step.is_nan() => f.write_str(
-                "the step is not a number; runs without an end (`steps`, `hold`, `section`) have none by default: give it by `step(h)`",
+                "the step size is not a number; runs without an end (`steps`, `hold`, `section`) have no default: set it with `step(h)`",
             ),
             Self::Step { step } => {
                 let step = Short(*step);
@@ -337,13 +337,16 @@ impl fmt::Display for RunErrorKind {
             }
             Self::TooManySteps { span, step } => {
                 let (span, step) = (Short(*span), Short(*step));
-                write!(f, "a span of {span} holds too many steps of {step}")
+                write!(
+                    f,
+                    "a span of {span} holds too many steps of {step}: choose longer steps, a shorter span, or a larger error if an accuracy was asked for"
+                )
             }
             Self::StepUnresolved { time, step, least } => {
                 let (step, time) = (Short(*step), Short(*time));
                 write!(
                     f,
-                    "a step of {step} is not resolved at t = {time}, where the least is {least:.1e}: count time from an origin near the motion"
+                    "a step of {step} is not resolved at t = {time}, where the shortest possible step is {least:.1e}: measure the time from an origin near the motion"
                 )
             }
             Self::NoOutput { name, known } => {
@@ -373,7 +376,7 @@ impl fmt::Display for RunErrorKind {
                 let time = Short(*time);
                 write!(
                     f,
-                    "the event `{name}` comes ever sooner and without end at t = {time}: let `Act::Stop` end the run, or `Act::Record` leave the motion alone, where it comes to rest"
+                    "the event `{name}` repeats ever sooner and without end at t = {time}, because the motion comes to rest there: end the run with `Act::Stop`, or leave the motion unchanged with `Act::Record`"
                 )
             }
             Self::NoParameter { name, known } => {
@@ -383,7 +386,7 @@ impl fmt::Display for RunErrorKind {
                 };
                 write!(
                     f,
-                    "there is no parameter `{name}` to set: the model has {known}"
+                    "there is no parameter `{name}`: the model has {known}"
                 )
             }
             Self::Parameter { name, value } => {
@@ -394,11 +397,11 @@ impl fmt::Display for RunErrorKind {
             }
             Self::ParametersFixed => write!(
                 f,
-                "the parameters of this model cannot be set: it has a field that cannot be copied, or kernels that do not say how"
+                "the parameters of this model cannot be changed: it has a field that cannot be copied, or kernels written by hand that do not implement it"
             ),
             Self::SetUnsupported { call } => write!(
                 f,
-                "`{call}` does not differentiate a run whose events set parameters; `run` goes through them, and `run_linearised` where the values do not depend on the state"
+                "`{call}` cannot differentiate a run whose events set parameters: use `run`, or `run_linearised` if the values do not depend on the state"
             ),
             Self::SetByState {
                 event,
@@ -406,7 +409,7 @@ impl fmt::Display for RunErrorKind {
                 parameter,
             } => write!(
                 f,
-                "the event `{event}` at t = {} sets `{parameter}` to a value that depends on the state, which transition matrices leave out: take differences of `run`, or put a coordinate in its place whose momentum does not appear in the Hamiltonian",
+                "the event `{event}` at t = {} sets `{parameter}` to a value that depends on the state, which transition matrices do not include: use differences of `run`, or replace the parameter by a coordinate whose momentum does not appear in the Hamiltonian",
                 Short(*time)
             ),
             Self::Input(error) => error.fmt(f),
@@ -416,13 +419,13 @@ impl fmt::Display for RunErrorKind {
             }
             Self::KinksUnsupported { call } => write!(
                 f,
-                "`{call}` does not cut steps at kinks; runs from start to end do"
+                "`{call}` does not support steps that are cut at kinks, because derivatives do not include the change of the times of the cuts; `run` does"
             ),
             Self::NodeOrder { node, time } => {
                 let time = Short(*time);
                 write!(
                     f,
-                    "node {node} at t = {time} does not lie beyond the one before it"
+                    "node {node} at t = {time} does not lie beyond the one before it, in the direction of the run"
                 )
             }
             Self::NodeEnds {
@@ -454,10 +457,10 @@ impl fmt::Display for RunErrorKind {
                 write_residuals(f, residuals)?;
                 write!(
                     f,
-                    "; `consistent_state` finds the nearest start that does not"
+                    "; `consistent_state` finds the nearest start that satisfies them"
                 )
             }
-            Self::Unsupported { call, of } => write!(f, "`{call}` is not to be had of {of}"),
+            Self::Unsupported { call, of } => write!(f, "`{call}` is not supported for {of}"),
             Self::Impulse { time } => {
                 let time = Short(*time);
                 write!(

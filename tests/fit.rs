@@ -413,7 +413,7 @@ fn what_cannot_be_fitted_is_told() {
         stray
             .expect_err("no fit")
             .to_string()
-            .contains("not looked for")
+            .contains("is not fitted")
     );
     // A first value that is no number has no bounds: the first run tells.
     let unknown = Ball {

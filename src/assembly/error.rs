@@ -15,7 +15,7 @@ pub enum AssemblyError {
         element: usize,
         /// Its start time.
         time: f64,
-        /// Why.
+        /// The cause.
         source: StepError,
     },
     /// A velocity or a momentum at a node could not be found (Legendre transform).
@@ -45,7 +45,7 @@ pub enum AssemblyError {
         iterations: u32,
         /// The size of the last correction beside the solution.
         correction: f64,
-        /// What was asked for.
+        /// The value asked for.
         tolerance: f64,
     },
 }
@@ -67,13 +67,13 @@ impl fmt::Display for AssemblyError {
                 residual,
             } => write!(
                 f,
-                "the solution violates the constraint `{constraint}` at t = {time}: {} off by {residual:.1e} of the largest; constraints that depend on one another contradict, \
-                 the position is singular, or what is asked for at the ends is not on the constraints",
+                "the solution violates the constraint `{constraint}` at t = {time}: {} off by {residual:.1e} of the largest; dependent constraints contradict each other, \
+                 the position is singular, or the values given at the ends violate the constraints",
                 if *position { "position" } else { "velocity" }
             ),
             Self::Singular { iterations } => write!(
                 f,
-                "the assembled equations are singular after {iterations} iterations: no solution near the guess, or a whole family of them"
+                "the assembled equations are singular after {iterations} iterations: there is no solution near the guess, or a whole family of them"
             ),
             Self::Stalled {
                 iterations,

@@ -150,7 +150,7 @@ pub enum MeshError {
     NoElements,
     /// A weight of a graded mesh is not positive, or the sum of the weights is not finite.
     Weight {
-        /// Which element.
+        /// The index of the element.
         element: usize,
         /// Its weight.
         weight: f64,

@@ -474,12 +474,12 @@ pub enum BoundaryError {
     },
     /// A component does not exist: its index is not below N.
     Component {
-        /// Which.
+        /// The component.
         component: Component,
     },
     /// A component is given twice at the same end.
     Twice {
-        /// Which.
+        /// The component.
         component: Component,
     },
     /// A given value is not finite.
@@ -520,9 +520,15 @@ impl fmt::Display for BoundaryError {
                     "{given} conditions at the ends, {needed} are needed: two for each coordinate"
                 )
             }
-            Self::Component { component } => write!(f, "{component:?} does not exist"),
+            Self::Component { component } => write!(
+                f,
+                "{component:?} does not exist: its index is not below the number of coordinates"
+            ),
             Self::Twice { component } => write!(f, "{component:?} is given twice at one end"),
-            Self::Value { component, value } => write!(f, "{component:?} is to be {value}"),
+            Self::Value { component, value } => write!(
+                f,
+                "{component:?} is given as {value}, but it must be finite"
+            ),
             Self::Mesh(error) => error.fmt(f),
             Self::Assembly(error) => error.fmt(f),
         }

@@ -12,14 +12,14 @@ use std::path::PathBuf;
 pub enum ChartError {
     /// The file could not be written.
     Io {
-        /// Which file.
+        /// The path of the file.
         path: PathBuf,
-        /// What the file system said.
+        /// The error of the file system.
         source: io::Error,
     },
     /// The ending of the file name is not one of the supported formats.
     UnknownEnding {
-        /// Which file.
+        /// The path of the file.
         path: PathBuf,
         /// The endings that can be.
         known: &'static [&'static str],

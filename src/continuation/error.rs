@@ -14,7 +14,7 @@ pub enum ContinuationErrorKind {
     NoParameter,
     /// The model has no derivative with respect to the parameter: it is not named in `sensitivity(…)`.
     NoSensitivity {
-        /// Those by which it has.
+        /// The parameters with respect to which it has derivatives.
         known: &'static [&'static str],
     },
     /// No range of the parameter was given: call `range`.
@@ -60,21 +60,27 @@ impl fmt::Display for ContinuationErrorKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoParameter => {
-                f.write_str("no parameter: give `.parameter(|model| &mut model.omega)`")
+                f.write_str("no parameter is set: give `.parameter(|model| &mut model.omega)`")
             }
             Self::NoSensitivity { known } => {
                 f.write_str(
-                    "the model has no derivative by this parameter: add `sensitivity(name)` to its `#[dynamics(...)]`",
+                    "the model has no derivative with respect to this parameter: add `sensitivity(name)` to its `#[dynamics(...)]`",
                 )?;
                 match known {
                     [] => Ok(()),
-                    known => write!(f, "; it has those by {}", known.join(", ")),
+                    known => write!(
+                        f,
+                        "; it has derivatives with respect to {}",
+                        known.join(", ")
+                    ),
                 }
             }
-            Self::NoRange => f.write_str("no range of the parameter: give `.range(0.3..2.5)`"),
+            Self::NoRange => {
+                f.write_str("no range of the parameter is set: give `.range(0.3..2.5)`")
+            }
             Self::Range { start, end, value } => write!(
                 f,
-                "the range {start}..{end} must be finite and hold the value {value} of the model, before its end"
+                "the range {start}..{end} must be finite and contain the value {value} of the model, before its end"
             ),
             Self::Steps {
                 step,
@@ -96,7 +102,7 @@ impl fmt::Display for ContinuationErrorKind {
                 )?;
                 match source {
                     Some(error) => error.fmt(f),
-                    None => f.write_str("it turns too much"),
+                    None => f.write_str("the branch turns too sharply"),
                 }
             }
         }

@@ -11,7 +11,7 @@ pub enum InputError {
     Unknown {
         /// The name asked for.
         name: String,
-        /// Those that there are.
+        /// The names that exist.
         known: Vec<&'static str>,
     },
     /// The function of an input returned a number that is not finite, so that an element could not be solved.
@@ -20,13 +20,13 @@ pub enum InputError {
         name: String,
         /// The time that the function was asked for.
         time: f64,
-        /// What it gave.
+        /// The value that it returned.
         value: f64,
     },
     /// The function of an input panicked. The message of the panic is on standard error, or where the program's panic
     /// hook puts it.
     Panicked {
-        /// Where the element begins that asked it, or the run.
+        /// The start of the element (or of the run) in which it was called.
         time: f64,
     },
     /// Sampled feedback whose period, name or time of sampling is invalid.
@@ -35,21 +35,21 @@ pub enum InputError {
         name: String,
         /// A time at which it was to be sampled.
         time: f64,
-        /// What is wrong with it.
+        /// The reason.
         why: &'static str,
     },
     /// An input was set to a number that is not finite.
     NotFinite {
         /// The input.
         name: String,
-        /// What it was set to.
+        /// The value.
         value: f64,
     },
     /// The table of an input is invalid.
     Table {
         /// The input.
         name: String,
-        /// What is wrong with it.
+        /// The reason.
         why: &'static str,
     },
 }
@@ -65,7 +65,7 @@ impl fmt::Display for InputError {
             Self::Value { name, time, value } => {
                 write!(
                     f,
-                    "the function of input `{name}` gives {value} at t = {time}"
+                    "the function of input `{name}` gives {value} at t = {time}, but it must be finite"
                 )
             }
             Self::Panicked { time } => write!(
@@ -73,10 +73,16 @@ impl fmt::Display for InputError {
                 "a function of an input panicked in the element that begins at t = {time}"
             ),
             Self::Sampling { name, time, why } => {
-                write!(f, "the feedback of input `{name}` at t = {time}: {why}")
+                write!(
+                    f,
+                    "the sampled feedback of input `{name}` at t = {time}: {why}"
+                )
             }
-            Self::NotFinite { name, value } => write!(f, "input `{name}` was set to {value}"),
-            Self::Table { name, why } => write!(f, "the table of input `{name}`: {why}"),
+            Self::NotFinite { name, value } => write!(
+                f,
+                "input `{name}` was set to {value}, but it must be finite"
+            ),
+            Self::Table { name, why } => write!(f, "the table of input `{name}` is invalid: {why}"),
         }
     }
 }

@@ -12,9 +12,9 @@ pub enum EnsembleError {
     Run(RunErrorKind),
     /// The number of starts is neither one nor the number of models.
     Starts {
-        /// How many models there are.
+        /// The number of models.
         models: usize,
-        /// How many starts.
+        /// The number of starts.
         starts: usize,
     },
 }
@@ -31,7 +31,7 @@ impl fmt::Display for EnsembleError {
             Self::Run(kind) => kind.fmt(f),
             Self::Starts { models, starts } => write!(
                 f,
-                "{models} models have {starts} starts, but each needs one, or all together one"
+                "{starts} starts were given for {models} models: give one start for all models, or one for each"
             ),
         }
     }

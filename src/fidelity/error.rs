@@ -23,18 +23,18 @@ pub enum FidelityError {
     },
     /// An output that was asked for is not declared by one of the models.
     UnknownOutput {
-        /// What was asked for.
+        /// The output asked for.
         output: String,
         /// The rung.
         rung: String,
-        /// What it declares.
+        /// The outputs that it declares.
         declared: Vec<String>,
     },
     /// The lengths of a model of run-time length do not fit each other.
     Model {
         /// The rung.
         rung: String,
-        /// Why.
+        /// The cause.
         source: RunErrorKind,
     },
     /// The list of elements is empty.
@@ -45,7 +45,7 @@ pub enum FidelityError {
     NoAccuracies,
     /// An accuracy is not positive, or not finite.
     Accuracy {
-        /// What was asked for.
+        /// The value asked for.
         accuracy: f64,
     },
     /// The number of parts of the span is zero, or larger than the largest number of steps.

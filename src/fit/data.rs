@@ -56,13 +56,13 @@ impl<'a> Column<'a> {
             })?),
         };
         let why = if times.len() != values.len() {
-            Some("there are not as many times as values")
+            Some("the numbers of times and values differ")
         } else if times.is_empty() {
             Some("there is none")
         } else if !times.iter().chain(values).all(|number| number.is_finite()) {
             Some("not all times and values are finite")
         } else if !(*deviation > 0.0 && deviation.is_finite()) {
-            Some("the deviation is no positive number")
+            Some("the standard deviation is not a positive number")
         } else {
             None
         };

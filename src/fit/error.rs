@@ -16,7 +16,7 @@ pub enum FitError {
     NoParameter {
         /// The name asked for.
         name: String,
-        /// Those that there are.
+        /// The names that exist.
         known: Vec<String>,
     },
     /// The model cannot be copied with other parameters: it has none, or it has a field of a type that cannot be
@@ -26,14 +26,14 @@ pub enum FitError {
     NoOutput {
         /// The name asked for.
         name: String,
-        /// Those that there are.
+        /// The names that exist.
         known: Vec<String>,
     },
     /// Measured values that cannot be used.
     Measured {
         /// The output.
         name: String,
-        /// What is wrong with them.
+        /// The reason.
         why: &'static str,
     },
     /// A range that does not contain the first value of its parameter, or that belongs to a parameter that is not
@@ -76,12 +76,12 @@ pub enum FitError {
         deviation: f64,
         /// Runs.
         runs: usize,
-        /// What the iteration says.
+        /// The message of the iteration.
         why: String,
     },
     /// The measured values do not determine all unknowns: some change of the unknowns changes no output.
     Undetermined {
-        /// The one that takes most part in that change.
+        /// The unknown with the largest part in that change.
         name: String,
     },
 }
@@ -90,23 +90,23 @@ impl fmt::Display for FitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NothingUnknown => {
-                f.write_str("nothing is looked for: name parameters, or leave the start open")
+                f.write_str("nothing is unknown: name `.parameters([…])`, or leave out `.start(…)`")
             }
             Self::NothingMeasured => f.write_str("there are no measured values"),
             Self::NoParameter { name, known } => write!(
                 f,
-                "`{name}` is no parameter that can be looked for once; parameters are `{}`",
+                "`{name}` is not a parameter of the model, or was named twice; parameters are `{}`",
                 known.join("`, `")
             ),
             Self::NotCopied => f.write_str(
-                "the model cannot be made with other parameters, nor copied: it has no parameter, or a field that is neither a number nor an array of numbers",
+                "the model cannot be copied with other parameters: it has no parameter, or a field that is neither a number nor an array of numbers",
             ),
             Self::NoOutput { name, known } => write!(
                 f,
                 "the model has no output or coordinate `{name}`, only `{}`",
                 known.join("`, `")
             ),
-            Self::Measured { name, why } => write!(f, "the values of `{name}`: {why}"),
+            Self::Measured { name, why } => write!(f, "the values of `{name}` cannot be used: {why}"),
             Self::Bounds {
                 name,
                 low,
@@ -114,7 +114,7 @@ impl fmt::Display for FitError {
                 value,
             } => {
                 if value.is_nan() {
-                    write!(f, "`{name}` has bounds but is not looked for")
+                    write!(f, "`{name}` has bounds but is not fitted: name it in `.parameters([…])`")
                 } else {
                     write!(
                         f,
@@ -126,12 +126,12 @@ impl fmt::Display for FitError {
                 write!(f, "a value was measured at t = {time}, before the start at {start}")
             }
             Self::StartOfConstraints => f.write_str(
-                "the start of a model with constraints must be known: `start(state, t0)`",
+                "the start of a model with constraints must be known: give `.start(state, t0)`",
             ),
             Self::TooFew { values, unknowns } => {
-                write!(f, "{values} values do not tell {unknowns} unknowns")
+                write!(f, "{values} measured values cannot determine {unknowns} unknowns")
             }
-            Self::Run(kind) => write!(f, "the run with the first parameters: {kind}"),
+            Self::Run(kind) => write!(f, "the run with the first parameters failed: {kind}"),
             Self::NotFinite => f.write_str(
                 "an output or its derivative is not finite in the run with the first parameters",
             ),
@@ -142,11 +142,11 @@ impl fmt::Display for FitError {
                 ..
             } => write!(
                 f,
-                "after {runs} runs the parameters are not found: {why}; the least deviation was {deviation:.3e}"
+                "after {runs} runs the parameters were not found: {why}; the least deviation was {deviation:.3e}"
             ),
             Self::Undetermined { name } => write!(
                 f,
-                "the measured values do not tell all unknowns: `{name}` can be changed, with others or alone, without a change of any of them"
+                "the measured values do not determine all unknowns: `{name}` can be changed, alone or with others, without changing any of them"
             ),
         }
     }

@@ -31,9 +31,9 @@ pub enum ModalError {
     NotFinite,
     /// The number of modes asked for is zero or larger than the number of coordinates.
     Modes {
-        /// How many were asked for.
+        /// The number asked for.
         modes: usize,
-        /// How many coordinates there are.
+        /// The number of coordinates.
         coordinates: usize,
     },
     /// The iteration for eigenvalues did not converge.
@@ -50,7 +50,7 @@ impl fmt::Display for ModalError {
                 f,
                 "{WHO} the energy function is not quadratic; write it for small motions about its equilibrium"
             ),
-            Self::TimeDependent => write!(f, "{WHO} the time appears in this one"),
+            Self::TimeDependent => write!(f, "{WHO} this one depends on time"),
             Self::Forced => write!(
                 f,
                 "{WHO} this one has forces or dissipation; a constant force belongs into the energy function"
@@ -65,10 +65,10 @@ impl fmt::Display for ModalError {
             } => write!(
                 f,
                 "{WHO} velocity {velocity} is multiplied by coordinate {coordinate} in this one: its modes would be complex, \
-                 unless such terms are the time derivative of a function of the coordinates; leave those out, they move nothing"
+                 unless such terms are the time derivative of a function of the coordinates; leave those out, they have no effect"
             ),
             Self::MassNotPositive => f.write_str(
-                "the kinetic energy must be positive for every velocity; is a mass zero?",
+                "the kinetic energy must be positive for every velocity other than zero; is a mass zero?",
             ),
             Self::NotFinite => f.write_str(
                 "an entry of the mass or stiffness matrix is not finite; look at the parameters",
@@ -78,7 +78,7 @@ impl fmt::Display for ModalError {
                 "{modes} modes were asked for, but a model of {coordinates} coordinates has 1 to {coordinates}"
             ),
             Self::NoEigenvalues => {
-                f.write_str("the iteration for the eigenvalues of the stiffness did not end")
+                f.write_str("the iteration for the eigenvalues of the stiffness matrix did not converge")
             }
             Self::Family(error) => error.fmt(f),
         }

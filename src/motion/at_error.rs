@@ -28,7 +28,7 @@ pub enum AtError {
         /// The outputs that there are.
         known: Vec<String>,
     },
-    /// No velocity belongs to the momentum at this time: the mass matrix is singular there.
+    /// No velocity belongs to the momentum at this time, for example because the mass matrix is singular there.
     NoVelocity {
         /// The time.
         time: f64,
@@ -57,7 +57,10 @@ impl fmt::Display for AtError {
                 known.join("`, `")
             ),
             Self::NoVelocity { time } => {
-                write!(f, "the momentum at t = {time} belongs to no velocity")
+                write!(
+                    f,
+                    "no velocity belongs to the momentum at t = {time}: is the mass matrix singular there?"
+                )
             }
         }
     }

@@ -143,7 +143,7 @@ impl fmt::Display for Warning {
                 f.write_str(": take a shorter step, or look for a singular point of the model")
             }
             Self::KinksCrossed => f.write_str(
-                "forces of the model have kinks or jumps, which steps go across: elements lose their order there, and errors fall more slowly than with smooth forces: `at_kinks(true)` cuts them",
+                "forces of the model have kinks or jumps inside steps: elements lose their order of accuracy there, and errors fall more slowly with the step size than for smooth forces; `at_kinks(true)` ends steps there",
             ),
             Self::Unresolved {
                 time,
@@ -152,7 +152,7 @@ impl fmt::Display for Warning {
                 ..
             } => write!(
                 f,
-                "the step {} at t = {} does not resolve the motion: shorter steps end elsewhere by {} of what the motion extends over; \
+                "the step {} at t = {} does not resolve the motion: shorter steps end elsewhere by {} of the extent of the motion; \
                  take a shorter step or an element with more nodes",
                 Short(*step),
                 Short(*time),

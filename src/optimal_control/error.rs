@@ -61,7 +61,7 @@ pub enum OptimalControlErrorKind {
     UnknownOutput {
         /// The name asked for.
         name: String,
-        /// Those that there are.
+        /// The names that exist.
         known: Vec<String>,
     },
     /// An end cost depends on an input, which has no value of its own at the end.
@@ -104,7 +104,7 @@ pub enum OptimalControlErrorKind {
         iterations: usize,
         /// The size of the last correction beside the solution.
         correction: f64,
-        /// What was asked for.
+        /// The value asked for.
         tolerance: f64,
     },
     /// The search reached a stationary point that is not a minimum: small changes of the inputs, and of the free part
@@ -179,7 +179,7 @@ impl fmt::Display for OptimalControlErrorKind {
                 "the model has the constraint `{constraint}`: optimal control needs coordinates without constraints"
             ),
             Self::NoCost => f.write_str(
-                "nothing costs anything: name an output with `.running_cost(…)` or `.end_cost(…)`",
+                "no cost was given: name an output with `.running_cost(…)` or `.end_cost(…)`",
             ),
             Self::UnknownOutput { name, known } if known.is_empty() => {
                 write!(f, "the model has no output `{name}`: it declares none")
@@ -191,12 +191,12 @@ impl fmt::Display for OptimalControlErrorKind {
             ),
             Self::EndCostOfInput { output, input } => write!(
                 f,
-                "the cost `{output}` of the end holds the input `{input}`, which has no value there of its own: make it a running cost"
+                "the end cost `{output}` depends on the input `{input}`, which has no value of its own at the end: make it a running cost"
             ),
             Self::Input(error) => error.fmt(f),
             Self::Degree { degree, largest } => write!(
                 f,
-                "inputs of degree {degree}, but the points of the element tell {largest} at most"
+                "inputs of degree {degree} were asked for, but the points of the element determine degree {largest} at most"
             ),
             Self::Legendre(error) => error.fmt(f),
             Self::Undefined {
@@ -214,8 +214,8 @@ impl fmt::Display for OptimalControlErrorKind {
                     _ => write!(f, "what {iterations} iterations have found")?,
                 }
                 f.write_str(
-                    ": an input costs nothing and moves nothing, the cost curves down along what is free of the start, \
-                     or small changes of the inputs do not bring the motion to its ends; \
+                    ": an input has neither a cost nor an effect, the cost has negative curvature along the free part of the start, \
+                     or small changes of the inputs cannot bring the motion to the values given at its ends; \
                      another guess or another span may help",
                 )
             }
@@ -226,7 +226,7 @@ impl fmt::Display for OptimalControlErrorKind {
             } => write!(
                 f,
                 "no minimum after {iterations} iterations: the last correction is {correction:.1e} of the solution, {tolerance:.1e} was asked for; \
-                 a better guess or more elements may help, or the cost falls without end"
+                 a better guess or more elements may help, or the cost decreases without bound"
             ),
             Self::NoMinimum {
                 element,
@@ -235,7 +235,7 @@ impl fmt::Display for OptimalControlErrorKind {
             } => write!(
                 f,
                 "no minimum after {iterations} iterations, but a stationary point from which the cost falls along small changes that begin in element {element}, at t = {time}; \
-                 begin with another guess of the inputs (`.guess_input(…)`) or of the motion (`.guess(…)`), or see whether the cost falls without end"
+                 begin with another guess of the inputs (`.guess_input(…)`) or of the motion (`.guess(…)`), or check whether the cost decreases without bound"
             ),
         }
     }

@@ -30,7 +30,7 @@ pub enum OrbitError {
     Mesh(MeshError),
     /// The phase condition names a coordinate that does not exist.
     Phase {
-        /// Which.
+        /// The index of that coordinate.
         index: usize,
     },
     /// The run that was to provide the first guess failed.
@@ -39,7 +39,7 @@ pub enum OrbitError {
     Run(RunErrorKind),
     /// An event stopped a motion before the end of its period.
     Stopped {
-        /// When.
+        /// The time.
         time: f64,
     },
     /// At the end of the period, events have left a parameter with another value than at the start: the state repeats,
@@ -52,7 +52,7 @@ pub enum OrbitError {
     },
     /// For orbits with events: Newton's corrections no longer bring the end of the motion nearer to its start.
     Stalled {
-        /// How far they are apart, in parts of the motion.
+        /// The distance between start and end, relative to the size of the motion.
         residual: f64,
         /// Corrections so far.
         iterations: u32,
@@ -108,7 +108,7 @@ impl fmt::Display for OrbitError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoPeriod => {
-                f.write_str("no period: give `.period(T)`, or `.unknown_period(guess)` for an autonomous model")
+                f.write_str("no period is set: give `.period(T)`, or `.unknown_period(guess)` for an autonomous model")
             }
             Self::Period { period } => write!(f, "the period is {period}, it must be positive"),
             Self::Number { what, value } => write!(f, "the {what} is {value}, it must be finite"),
@@ -116,12 +116,12 @@ impl fmt::Display for OrbitError {
                 "the model depends on time, so its orbits have the period of the forcing: give it with `.period(T)`",
             ),
             Self::Mesh(error) => error.fmt(f),
-            Self::Unsupported { call, of } => write!(f, "`{call}` is not to be had of {of}"),
+            Self::Unsupported { call, of } => write!(f, "`{call}` is not supported for {of}"),
             Self::Phase { index } => {
-                write!(f, "the condition of phase names coordinate {index}, which does not exist")
+                write!(f, "the phase condition names coordinate {index}, which does not exist")
             }
-            Self::Guess(error) => write!(f, "the motion that was to be the guess: {error}"),
-            Self::Run(error) => write!(f, "a motion on the way to the orbit: {error}"),
+            Self::Guess(error) => write!(f, "the run for the first guess failed: {error}"),
+            Self::Run(error) => write!(f, "a run in the search for the orbit failed: {error}"),
             Self::Stopped { time } => {
                 write!(f, "an event ends the motion at t = {time}, before a period has passed")
             }
@@ -134,14 +134,14 @@ impl fmt::Display for OrbitError {
                 iterations,
             } => write!(
                 f,
-                "no orbit near the guess: after {iterations} corrections end and start are {residual:.1e} of the motion apart"
+                "no orbit near the guess: after {iterations} corrections the end of the motion differs from its start by {residual:.1e} of the motion"
             ),
             Self::HybridConstraints => f.write_str(
-                "orbits with events are found for models without constraints only: declare minimal coordinates",
+                "orbits with events are not supported for models with constraints: declare the model in minimal coordinates",
             ),
             Self::AtRest => f.write_str(
-                "the search for an orbit comes to rest: an equilibrium, which repeats after any time; begin from a state that moves, nearer to the orbit \
-                 (the multipliers of an equilibrium itself are those of `.period(T)` and a guess at rest)",
+                "the search for an orbit ends at an equilibrium, which repeats after any time: begin from a moving state nearer to the orbit \
+                 (for the multipliers of the equilibrium itself, give `.period(T)` and a guess at rest)",
             ),
             Self::Assembly(error) => error.fmt(f),
             Self::NoFamily { unfolding } => write!(
@@ -149,8 +149,11 @@ impl fmt::Display for OrbitError {
                 "no orbit of this period near the guess: only an additional force {unfolding:.1e} v closes it; \
                  if the model has an isolated orbit, give `.unknown_period(guess)`"
             ),
-            Self::Constraints(error) => write!(f, "the constraints: {error}"),
-            Self::Multipliers(error) => write!(f, "the multipliers: {error}"),
+            Self::Constraints(error) => write!(
+                f,
+                "the motions that the constraints allow cannot be found at all nodes: {error}"
+            ),
+            Self::Multipliers(error) => write!(f, "the Floquet multipliers cannot be computed: {error}"),
             #[cfg(feature = "sparse")]
             Self::Family(error) => error.fmt(f),
         }

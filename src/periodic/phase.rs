@@ -11,14 +11,14 @@ pub enum Phase {
     Orthogonal,
     /// A coordinate has a given value at the start. The orbit must cross that value: q̇ ≠ 0 there.
     Coordinate {
-        /// Which coordinate.
+        /// The index of the coordinate.
         index: usize,
         /// Its value.
         value: f64,
     },
     /// A momentum has a given value at the start; zero for a turning point of a coordinate with a momentum of its own.
     Momentum {
-        /// Which momentum.
+        /// The index of the momentum.
         index: usize,
         /// Its value.
         value: f64,

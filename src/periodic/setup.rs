@@ -222,7 +222,7 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         let given = [
             ("time of the start", self.start),
             ("energy", self.energy.unwrap_or(0.0)),
-            ("value of the condition of phase", phase),
+            ("value of the phase condition", phase),
         ];
         let wrong = given.into_iter().find(|(_, value)| !value.is_finite());
         wrong.map_or(Ok(()), |(what, value)| {

@@ -22,7 +22,7 @@ pub enum PeriodicSchurError {
     },
     /// A factor is not square.
     NotSquare {
-        /// Which factor.
+        /// The index of the factor.
         index: usize,
         /// Its number of rows.
         rows: usize,
@@ -31,7 +31,7 @@ pub enum PeriodicSchurError {
     },
     /// A factor differs in size from the first.
     SizeMismatch {
-        /// Which factor.
+        /// The index of the factor.
         index: usize,
         /// Its number of rows.
         found: usize,
@@ -40,7 +40,7 @@ pub enum PeriodicSchurError {
     },
     /// A factor holds an entry that is infinite or not a number, or, for [`PeriodicSchur`](super::PeriodicSchur), its triangular form would.
     NonFinite {
-        /// Which factor.
+        /// The index of the factor.
         index: usize,
     },
     /// The QR iteration did not converge for a diagonal block.
@@ -58,7 +58,10 @@ impl fmt::Display for PeriodicSchurError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => write!(f, "the product has no factor"),
-            Self::Constraints(source) => write!(f, "the constraints: {source}"),
+            Self::Constraints(source) => write!(
+                f,
+                "the motions that the constraints allow cannot be found at all nodes: {source}"
+            ),
             Self::Length { order, found } => {
                 write!(
                     f,
@@ -95,7 +98,7 @@ impl fmt::Display for PeriodicSchurError {
             } => {
                 write!(
                     f,
-                    "rows {first} to {last} of the product did not separate in {iterations} QR steps"
+                    "the QR iteration did not separate the eigenvalues of rows {first} to {last} in {iterations} steps"
                 )
             }
         }

@@ -203,7 +203,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
             };
             let within = start.min(end)..=start.max(end);
             let why = if times.len() != values.len() {
-                "there are not as many times as values"
+                "the numbers of times and values differ"
             } else if !times.iter().all(|t| within.contains(t)) {
                 "not all times are in the span"
             } else if !values.iter().all(|value| value.is_finite()) {
@@ -394,11 +394,11 @@ impl<const N: usize, L: Length<N>> LossGradient<N, L> {
         let lost = match by_parameters.iter().position(is_lost) {
             Some(at) => Some((
                 names[at].clone(),
-                "the derivative by this parameter is not finite",
+                "the derivative with respect to this parameter is not finite",
             )),
             None if by_start.iter().any(is_lost) => Some((
                 "start".to_owned(),
-                "the derivatives by the start are not finite",
+                "the derivatives with respect to the start are not finite",
             )),
             None => None,
         };

@@ -40,7 +40,7 @@ pub enum DominantError {
     NotConverged {
         /// The best value so far.
         best: Dominant,
-        /// What was asked for.
+        /// The value asked for.
         tolerance: f64,
     },
 }

@@ -20,7 +20,7 @@ use tfe_runtime::{
 pub enum LinearModelError {
     /// The model has constraints: second derivatives at a state say nothing about the motions that these allow.
     Constrained,
-    /// No velocity belongs to the momentum at the state: the mass matrix is singular.
+    /// No velocity belongs to the momentum at the state, for example because the mass matrix is singular there.
     NoVelocity,
     /// A second derivative is infinite or not a number.
     NotFinite,
@@ -32,7 +32,9 @@ impl fmt::Display for LinearModelError {
             Self::Constrained => {
                 "a model with constraints has no linear model about a state; `stability::on_constraints` linearises its steps"
             }
-            Self::NoVelocity => "the momentum of the state belongs to no velocity",
+            Self::NoVelocity => {
+                "no velocity belongs to the momentum of the state: is the mass matrix singular there?"
+            }
             Self::NotFinite => "a second derivative of the model is not finite at the state",
         })
     }

@@ -117,21 +117,21 @@ impl Error for WorkPrecisionError {
 pub enum SaveError {
     /// The file could not be written.
     Io {
-        /// Which file.
+        /// The path of the file.
         path: PathBuf,
-        /// What the file system said.
+        /// The error of the file system.
         source: io::Error,
     },
     /// The ending of the file name is not one of the supported formats.
     UnknownEnding {
-        /// Which file.
+        /// The path of the file.
         path: PathBuf,
         /// The endings that can be.
         known: &'static [&'static str],
     },
     /// Pictures and pages need the feature `charts`.
     NoCharts {
-        /// Which file.
+        /// The path of the file.
         path: PathBuf,
     },
     /// The picture could not be made.

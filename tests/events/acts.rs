@@ -202,7 +202,7 @@ fn what_is_set_goes_together() {
     let error = run(Settings::new("kk", 1.0)).expect_err("no parameter");
     assert_eq!(
         error.kind().to_string(),
-        "there is no parameter `kk` to set: the model has m, k"
+        "there is no parameter `kk`: the model has m, k"
     );
     let error = run(Settings::new("k", f64::NAN)).expect_err("not finite");
     assert!(matches!(error.kind(), RunErrorKind::Parameter { .. }));

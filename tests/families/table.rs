@@ -90,7 +90,7 @@ fn told(outcome: Outcome) -> String {
         return "works".to_owned();
     };
     let text = error.to_string();
-    let is_refusal = text.contains(" is not to be had of models of run-time length");
+    let is_refusal = text.contains(" is not supported for models of run-time length");
     assert!(is_refusal, "no refusal: {text}");
     "refused".to_owned()
 }

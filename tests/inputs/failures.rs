@@ -32,11 +32,11 @@ fn misuse_is_told() {
     };
     assert_eq!(
         table(&[0.0, 1.0], &[1.0]),
-        "the table of input `u`: there must be as many values as times, and at least one"
+        "the table of input `u` is invalid: there must be as many values as times, and at least one"
     );
     assert_eq!(
         table(&[0.0, 0.0], &[1.0, 2.0]),
-        "the table of input `u`: the times must increase"
+        "the table of input `u` is invalid: the times must increase"
     );
     // Without a number there is no state, and an error says where and which input it was.
     let nan = Simulation::new(&DRIVING)
@@ -55,7 +55,7 @@ fn misuse_is_told() {
     run.set("u", f64::NAN);
     assert_eq!(
         run.advance().unwrap_err().to_string(),
-        "input `u` was set to NaN"
+        "input `u` was set to NaN, but it must be finite"
     );
     run.set("v", 1.0);
     assert!(matches!(
@@ -67,7 +67,7 @@ fn misuse_is_told() {
     let without_step = Simulation::new(&DRIVING).hold(start, 0.0);
     let kind = without_step.map(|_| ()).unwrap_err();
     assert!(matches!(kind, RunErrorKind::Step { .. }));
-    assert!(kind.to_string().contains("give it by `step(h)`"), "{kind}");
+    assert!(kind.to_string().contains("set it with `step(h)`"), "{kind}");
 }
 
 /// A function that panics, or gives what is no number, ends a run with an error that says when; what was recorded before is kept.

@@ -517,7 +517,7 @@ fn questions_without_an_answer() {
         .expect_err("no branch");
     assert_eq!(
         error.to_string(),
-        "the model has no derivative by this parameter: add `sensitivity(name)` to its `#[dynamics(...)]`; it has those by omega, f"
+        "the model has no derivative with respect to this parameter: add `sensitivity(name)` to its `#[dynamics(...)]`; it has derivatives with respect to omega, f"
     );
     for range in [1.0..2.0, 0.5..0.8, 0.8..f64::INFINITY, f64::NAN..1.0] {
         assert!(matches!(

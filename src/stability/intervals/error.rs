@@ -18,7 +18,7 @@ pub enum IntervalError<E> {
     Matrix {
         /// The parameter.
         at: f64,
-        /// Why.
+        /// The cause.
         source: E,
     },
     /// The matrix is empty, not square, or differs in size from the matrix at other parameters.
@@ -45,7 +45,7 @@ pub enum IntervalError<E> {
     Unresolved {
         /// Where the last evaluation was.
         near: f64,
-        /// How many evaluations were spent.
+        /// The number of evaluations made.
         evaluations: usize,
     },
 }

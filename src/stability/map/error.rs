@@ -40,14 +40,14 @@ pub enum MapError {
     },
     /// The file could not be written.
     Io {
-        /// Which file.
+        /// The path of the file.
         path: PathBuf,
-        /// What the file system said.
+        /// The error of the file system.
         source: io::Error,
     },
     /// The ending of the file name is not one of the supported formats.
     UnknownEnding {
-        /// Which file.
+        /// The path of the file.
         path: PathBuf,
         /// The endings that can be.
         known: &'static [&'static str],
@@ -179,14 +179,14 @@ pub enum FloquetError {
     Step {
         /// The number of the element in the period, from 0.
         element: usize,
-        /// Why.
+        /// The cause.
         source: StepError,
     },
     /// An element has no transition matrix.
     Transition {
         /// The number of the element in the period, from 0.
         element: usize,
-        /// Why.
+        /// The cause.
         source: TransitionError,
     },
     /// The rest state q = 0, p = 0 is not an equilibrium of the model: an element moved away from it.
