@@ -49,7 +49,7 @@ pub use fit::Fit;
 pub use linearised::Linearised;
 pub use modal::Modal;
 pub use motion::{Motion, MotionArc, Node, Outputs, Setting};
-/// The crate of the matrices that calls give and take, in their version.
+/// The linear-algebra crate whose matrices this crate takes and returns, in the version that it uses.
 pub use nalgebra;
 pub use optimal_control::{OptimalControl, Optimum};
 pub use periodic::{HybridOrbit, Orbit, PeriodicOrbit};
@@ -59,9 +59,10 @@ pub use simulation::{
     Simulation, Steps, Warning,
 };
 pub use tfe_macros::dynamics;
-/// The runtime that generated code links into: elements, schemes, Newton, transition matrices, the paper's nodal forms.
+/// The runtime with which generated code is linked: elements, their tables, Newton's method, transition matrices, the
+/// nodal forms of the paper.
 pub use tfe_runtime as runtime;
-/// Elements by name, with the number of nodes in the type.
+/// The elements by name, with the number of nodes as a const parameter: `Mixed::<4>`, `Radau::<3>`, …
 pub use tfe_runtime::element::markers::*;
 pub use tfe_runtime::{
     Element, Family, Model, Rule, Solve, State, Statistics, StepError, Structure,
@@ -69,7 +70,7 @@ pub use tfe_runtime::{
 pub use velocity::Velocity;
 pub use work_precision::WorkPrecision;
 
-/// What a program that simulates needs: `use tfe::prelude::*;`.
+/// The items that most programs need: `use tfe::prelude::*;`.
 pub mod prelude {
     #[cfg(feature = "fit")]
     pub use crate::Fit;
