@@ -53,7 +53,7 @@ pub struct Driven<'m, M, L = FixedLength> {
     note = "inputs are declared by `input(u)` in `#[dynamics(...)]`"
 )]
 pub trait HasInputs<const N: usize, L>: Send + Sync {
-    /// Their names, in order.
+    /// The names of the inputs, in the order of declaration.
     const INPUTS: &'static [&'static str];
 }
 
@@ -72,10 +72,10 @@ impl<M: family::Controlled> HasInputs<0, RunTimeLength> for M {
     note = "inputs are declared by `input(u)` in `#[dynamics(...)]`"
 )]
 pub trait Drivable<'m, const N: usize, L>: Sized {
-    /// The model that declares them.
+    /// The type of the model that declares the inputs.
     type Declaring: HasInputs<N, L>;
 
-    /// The model with the inputs that it has, else zero.
+    /// The model with the inputs that it already has; other inputs are zero.
     fn driven(model: Share<'m, Self>) -> Driven<'m, Self::Declaring, L>;
 }
 

@@ -1,4 +1,4 @@
-//! What can go wrong in a run, where and why.
+//! Errors of runs: what failed, where and why.
 
 use crate::constraints::write_residuals;
 use crate::driven::InputError;

@@ -1,4 +1,5 @@
-//! Models of both kinds of length: what their states, polynomials and checkpoints are.
+//! The two kinds of length of models: fixed at compile time, or known at run time. They determine the vectors,
+//! polynomials and checkpoints of motions.
 
 pub use tfe_runtime::length::{Declared, FixedLength, RunTimeLength};
 
@@ -13,36 +14,36 @@ use tfe_runtime::{CoordinateName, State};
 /// A [`Motion<N>`](crate::Motion) belongs to `FixedLength`; the motion of a model of run-time length is a `Motion<0,
 /// RunTimeLength>`, or [`family::Motion`](crate::family::Motion) for short.
 pub trait Length<const N: usize>: Copy + Debug + PartialEq + Send + Sync + 'static {
-    /// Coordinates, momenta or velocities.
+    /// The type of a vector of coordinates, momenta or velocities.
     type Vector: Clone + Debug + PartialEq + AsRef<[f64]> + Send + Sync;
-    /// A point of phase space.
+    /// The type of a state (q, p).
     type State: Clone + Debug + PartialEq + Send + Sync;
-    /// The solution inside an element.
+    /// The type of the polynomial solution inside an element.
     type Polynomial: Polynomial<State = Self::State, Vector = Self::Vector>;
-    /// What makes the steps.
+    /// The type that makes the steps; internal.
     type Stepper<'m, M: 'm>;
-    /// A stepper without its model.
+    /// A stepper without its model; internal.
     type Suspended: Clone + Debug + Send + Sync;
-    /// A force that acts at one instant.
+    /// The type of an impulse.
     type Impulse: Clone + Debug;
-    /// The name of a constraint.
+    /// The type of the name of a constraint.
     type ConstraintName: Clone + Debug + Display + PartialEq;
 
-    /// The state of coordinates and momenta.
+    /// The state (q, p) with given coordinates and momenta.
     fn state(q: Self::Vector, p: Self::Vector) -> Self::State;
 
-    /// Coordinates and momenta.
+    /// The coordinates and the momenta of a state.
     fn parts(state: &Self::State) -> (&Self::Vector, &Self::Vector);
 
-    /// As many numbers as another vector has: what a function gives for 0, 1, …
+    /// A vector as long as `like`, with the values of a function at 0, 1, …
     fn from_fn(like: &Self::Vector, number: impl FnMut(usize) -> f64) -> Self::Vector;
 
-    /// As many NaN as another vector has numbers.
+    /// A vector as long as `like`, of NaN.
     fn unknown(like: &Self::Vector) -> Self::Vector {
         Self::from_fn(like, |_| f64::NAN)
     }
 
-    /// As many zeros as another vector has numbers.
+    /// A vector as long as `like`, of zeros.
     fn zero(like: &Self::Vector) -> Self::Vector {
         Self::from_fn(like, |_| 0.0)
     }
@@ -99,35 +100,35 @@ impl Length<0> for RunTimeLength {
 
 /// The polynomial solution inside an element, or inside the pieces into which it was cut; internal.
 pub trait Polynomial: Clone + Debug {
-    /// A point of phase space.
+    /// The type of a state (q, p).
     type State;
-    /// Velocities.
+    /// The type of a vector of velocities.
     type Vector;
 
-    /// Time at the start.
+    /// The time at the start of the element.
     fn start(&self) -> f64;
 
-    /// Time at the end.
+    /// The time at the end of the element.
     fn end(&self) -> f64;
 
-    /// How long it is, to the digits of the step.
+    /// The length of the element, with all digits of the step size.
     fn length(&self) -> f64;
 
-    /// The degree of the coordinates.
+    /// The degree of the polynomial of the coordinates.
     fn degree(&self) -> usize;
 
-    /// The pieces of an element that was cut; the element itself if it was not.
+    /// The pieces, if the element was cut; otherwise the element itself.
     fn pieces(&self) -> &[Self]
     where
         Self: Sized;
 
-    /// The state at a fraction of its length, between 0 and 1; of an element that is not cut.
+    /// The state at a fraction of the length, between 0 and 1; only for an element that was not cut.
     fn at(&self, fraction: f64) -> Self::State;
 
     /// The state at a time between start and end.
     fn at_time(&self, time: f64) -> Self::State;
 
-    /// dq/dt there: the derivative of the polynomial.
+    /// The velocities dq/dt at a time: the derivative of the polynomial.
     fn velocity_at_time(&self, time: f64) -> Self::Vector;
 }
 

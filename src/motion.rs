@@ -1,4 +1,4 @@
-//! The result of a run: nodes, dense output, energy, observables, statistics.
+//! Motions, the results of runs: nodes, dense output, energy, outputs, events, statistics.
 
 mod arcs;
 mod at_error;

@@ -1,4 +1,4 @@
-//! A motion with its derivatives by parameters and by its start.
+//! Sensitivities: derivatives of motions with respect to the parameters of their model and to their start.
 
 pub(crate) mod hessian;
 pub(crate) mod inside;

@@ -11,10 +11,10 @@ pub trait Models<'m, M>: Copy + Sync + 'm {
     /// The model of one run.
     fn model(&self, index: usize) -> &'m M;
 
-    /// How many runs there are of so many starts.
+    /// The number of runs for a number of starts.
     ///
     /// # Errors
-    /// [`EnsembleError::Starts`] where starts and models do not belong together.
+    /// [`EnsembleError::Starts`] if the number of starts does not fit the number of models.
     fn count(&self, starts: usize) -> Result<usize, EnsembleError>;
 }
 

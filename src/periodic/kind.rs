@@ -14,7 +14,7 @@ use tfe_runtime::{Model, State, Statistics};
     )
 )]
 pub trait Closed<M, const N: usize>: Length<N> {
-    /// A chain of elements that is solved.
+    /// The type of a solved chain of elements.
     type Solution<'m>: Chained<N, Self>
     where
         M: 'm;
@@ -22,25 +22,25 @@ pub trait Closed<M, const N: usize>: Length<N> {
 
 /// A chain of elements over one period.
 pub trait Chained<const N: usize, L: Length<N>> {
-    /// The length of all of it.
+    /// The period.
     fn period(&self) -> f64;
 
-    /// The state at its start.
+    /// The state at the start of the period.
     fn start(&self) -> L::State;
 
-    /// The ends of the elements, in order.
+    /// The nodes, in order.
     fn nodes(&self) -> Vec<Node<N, L>>;
 
-    /// The transition matrices of the elements.
+    /// The transition matrices of the elements, in order.
     fn transitions(&self) -> Vec<DMatrix<f64>>;
 
-    /// Lengths of so many elements, each with the same piece of the orbit.
+    /// Element lengths that give each of `elements` elements the same arc length of the orbit.
     fn equidistributed(&self, elements: usize) -> Vec<f64>;
 
-    /// What the solution cost.
+    /// Counts of iterations, evaluations and factorisations of the solution.
     fn statistics(&self) -> &Statistics;
 
-    /// Through the polynomials of the elements.
+    /// The motion with dense output from the polynomials of the elements.
     fn motion(&self) -> Motion<N, L>;
 }
 

@@ -26,12 +26,12 @@ use tfe_runtime::length::RunTimeLength;
     )
 )]
 pub trait Transitions<M, const N: usize> {
-    /// A point of phase space.
+    /// The type of a state (q, p).
     type State;
-    /// Why there is no matrix.
+    /// The error if there is no transition matrix.
     type Error: Error;
 
-    /// The matrix of one element, and where it ends.
+    /// The transition matrix of one element, and the state at its end.
     ///
     /// # Errors
     /// As [`transition_matrix`](super::transition_matrix).
@@ -43,7 +43,7 @@ pub trait Transitions<M, const N: usize> {
         h: f64,
     ) -> Result<(DMatrix<f64>, Self::State), Self::Error>;
 
-    /// An orthonormal basis of the motions that constraints allow at a state.
+    /// An orthonormal basis of the variations that the constraints allow at a state.
     ///
     /// # Errors
     /// As [`on_constraints`](super::on_constraints).

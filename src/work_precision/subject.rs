@@ -16,9 +16,9 @@ use tfe_runtime::{Element, Form, Model, State, Statistics, StepError};
 /// A state that can be read as numbers: [`State`] for models of fixed size, [`FamilyState`] for those of run-time
 /// length.
 pub trait PhasePoint: Clone {
-    /// The coordinates.
+    /// The coordinates q.
     fn q(&self) -> &[f64];
-    /// The momenta, as many.
+    /// The momenta p, as many as coordinates.
     fn p(&self) -> &[f64];
 }
 
