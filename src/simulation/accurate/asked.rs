@@ -24,7 +24,8 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Chooses the element and the step size such that the estimated error is at most `accuracy`, and runs with them.
+    /// Asks for an accuracy: the run then chooses the element and the step size such that the estimated error is at most
+    /// `accuracy`, a number between 0 and 1.
     ///
     /// The error is relative, and estimated at the times at which the runs are compared: the error of the coordinates
     /// divided by the largest coordinate, of the momenta divided by the largest momentum, and of each declared output

@@ -34,9 +34,9 @@ where
     /// changes its sign then. If a value stays at zero for a while between two different signs, there is one event, at
     /// some time in between.
     ///
-    /// The run returns [`RunErrorKind::NoEvent`](crate::RunErrorKind::NoEvent) if the model declares no event or output of
-    /// this name, and [`RunErrorKind::EventsWithoutEnd`](crate::RunErrorKind::EventsWithoutEnd) if events follow each other
-    /// ever faster without end.
+    /// The run returns [`RunErrorKind::NoEvent`](crate::RunErrorKind::NoEvent) if the model declares no event or output
+    /// of this name, and [`RunErrorKind::EventsWithoutEnd`](crate::RunErrorKind::EventsWithoutEnd) if events follow
+    /// each other ever faster without end.
     ///
     /// ```
     /// use tfe::prelude::*;
