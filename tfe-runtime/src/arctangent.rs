@@ -1,26 +1,28 @@
-//! Arctangents of several numbers at once, without branches: the same digits on every processor.
+//! Arctangents of several numbers at once, without branches; the digits are the same on every processor.
 //!
 //! ```text
 //! u = t, (2t − 1)/(2 + t), (t − 1)/(t + 1)  for  t = min(|x|, |y|)/max(|x|, |y|) up to 7/16, 11/16, 1
 //! arctan t = 0, arctan ½, π/4  +  arctan u ,        |u| < 7/16
 //! ```
 //!
-//! and that, or π/2 less it, or π less either, is the angle. Numerators are exact. Polynomial and intervals are those of fdlibm (S. Moshier, K. C. Ng); base and polynomial are
-//! added last, the base with what rounding takes from it. Zeros for y, and numbers that are subnormal, huge or none, are rare and go to the functions of the system, lane by
-//! lane.
+//! The angle is then arctan t, or its difference from π/2 or π, depending on the octant of (x, y). The numerators are
+//! exact. The polynomial and the intervals are those of fdlibm (S. Moshier, K. C. Ng). The base (0, arctan ½ or π/4)
+//! and the polynomial are added last, together with the rounding error of the base. Lanes in which y is zero, or a
+//! number is subnormal, huge, infinite or NaN, are rare and are evaluated one by one by the functions of the system.
 //!
-//! Judged in double-double arithmetic, the angle is off by less than 1.5 units in the last place. A single number is left to the functions of the system.
+//! Compared with double-double arithmetic, the error of the angle is less than 1.5 units in the last place. A single
+//! number is left to the functions of the system.
 
 use crate::real::Real;
 use crate::trigonometry::{Turn, replace_outside_of_two};
 
-/// Magnitudes of y that are computed here.
+/// The magnitudes of y for which the angle is computed here.
 pub(crate) const ORDINARY: (f64, f64) = (f64::MIN_POSITIVE, FAR);
 
-/// Sums of two such numbers are finite.
+/// The sum of two numbers of this magnitude is finite.
 const FAR: f64 = 1e300;
 
-/// Of x, zero among them.
+/// The range of x for which the angle is computed here; zero is included.
 pub(crate) const FINITE: (f64, f64) = (-FAR, FAR);
 
 const HALF: f64 = 0.463_647_609_000_806_1; // arctan ½
@@ -62,7 +64,7 @@ pub(crate) fn atan2_of_ordinary<R: Turn>(y: R, x: R) -> R {
     let low = R::select(about_half, y.like(HALF_LOW), zero);
     let low = R::select(about_one, y.like(QUARTER_LOW), low);
     let u = over / under;
-    // By halves, so that no chain of operations is long.
+    // The polynomial is evaluated in two halves, so that the chains of dependent operations are short.
     let c = &SERIES;
     let z = u * u;
     let w = z * z;
@@ -75,7 +77,7 @@ pub(crate) fn atan2_of_ordinary<R: Turn>(y: R, x: R) -> R {
     let odd = w.fused(odd, y.like(c[1]));
     let series = z.fused(even, w * odd);
     let part = u - u * series;
-    // π/2 less it where |y| is the larger one.
+    // Where |y| is the larger one, the angle is π/2 less the arctangent.
     let (base, low, part) = less_from(
         is_steep,
         (2.0 * QUARTER, 2.0 * QUARTER_LOW),
@@ -90,7 +92,7 @@ pub(crate) fn atan2_of_ordinary<R: Turn>(y: R, x: R) -> R {
     R::select(y.less(zero), -angle, angle)
 }
 
-/// `whole` less a sum of three where the mask holds, the first no larger than it.
+/// `whole` minus a sum of three terms where the mask holds; the first term is no larger than `whole`.
 #[inline(always)]
 fn less_from<R: Turn>(
     mask: R::Mask,
@@ -106,7 +108,7 @@ fn less_from<R: Turn>(
     )
 }
 
-/// Angles of W points.
+/// The angles of W points.
 #[inline]
 pub(crate) fn atan2<const W: usize>(y: &[f64; W], x: &[f64; W]) -> [f64; W] {
     let (mut angles, mut heights) = ([0.0; W], [0.0; W]);

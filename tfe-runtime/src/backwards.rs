@@ -1,6 +1,8 @@
-//! Elements backwards: products of one row with the derivative of an element, and derivatives by many parameters at once (T-127).
+//! Adjoint of an element: products of a row vector with the derivative of an element, and derivatives by many
+//! parameters at once (T-127).
 //!
-//! Where the element's own iteration contracts, so does the transposed one, and no tangent is set up and factored. With the seeds φ of forces at the points of a collocated element,
+//! Where the fixed-point iteration of the element contracts, the transposed iteration contracts as well, and no tangent
+//! has to be set up and factored. With the adjoint seeds φ of the forces at the points of a collocated element,
 //!
 //! ```text
 //! φ_l = h b_l λ_p + h Σ_i A_il μ_i ,     F_l = (L_qq + Q_q)ᵀ φ_l − L_vqᵀ μ_l ,
@@ -18,12 +20,12 @@ use crate::tape::{Places, Tape};
 use crate::velocity_form::{PointDerivatives, VelocityForm};
 use alloc::vec::Vec;
 
-/// Whether directions are parameters and nothing else, and so many that all parameters are differentiated at once.
+/// Whether all directions are parameters, and so many of them that it pays to differentiate by all parameters at once.
 pub(crate) fn are_parameters<M: Model<N>, const N: usize>(
     model: &M,
     directions: &[Direction],
 ) -> bool {
-    /// With fewer, dual numbers take less.
+    /// With fewer directions, dual numbers are cheaper.
     const LEAST: usize = 4;
     let is_one = |direction: &Direction| {
         let moves = [direction.time, direction.length, direction.damping] != [0.0; 3];
@@ -33,7 +35,7 @@ pub(crate) fn are_parameters<M: Model<N>, const N: usize>(
     M::CONSTRAINTS.is_empty() && directions.len() >= LEAST && directions.iter().all(is_one)
 }
 
-/// Elements backwards: what they have of all parameters, added up, and the memory that it takes.
+/// The adjoint of elements: the accumulated derivatives by all parameters, and the memory that their computation needs.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Backwards<const N: usize> {
     tape: Tape,
@@ -41,12 +43,12 @@ pub(crate) struct Backwards<const N: usize> {
 }
 
 impl<const N: usize> Backwards<N> {
-    /// Nothing yet, of so many parameters.
+    /// Sets the sums of this many parameters to zero.
     pub(crate) fn begin(&mut self, parameters: usize) {
         self.tape.begin(parameters);
     }
 
-    /// Of an element in phase space, with μ of (T-127).
+    /// Adds the derivatives of an element in phase space, given μ of (T-127).
     pub(crate) fn of_phase<M: Model<N>>(
         &mut self,
         equations: &PhaseForm<'_, M, N>,
@@ -73,7 +75,8 @@ impl<const N: usize> Backwards<N> {
         }
     }
 
-    /// Of an element in velocities, with λ of the momenta at its end, and seeds of the forces at its points, if there are any.
+    /// Adds the derivatives of an element in velocity form, given the adjoint λ of the momenta at its end and, if there
+    /// are any, adjoint seeds of the forces at its points.
     pub(crate) fn of_velocities<M: Model<N>>(
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,
@@ -138,7 +141,7 @@ impl<const N: usize> Backwards<N> {
         Ok(())
     }
 
-    /// Adds what was found to the sums of directions.
+    /// Adds the accumulated derivatives to the sums of the directions.
     pub(crate) fn add_to<M: Model<N>>(
         &self,
         model: &M,
@@ -152,24 +155,24 @@ impl<const N: usize> Backwards<N> {
     }
 }
 
-/// What (T-150) needs of points; where it is zero there is nothing.
+/// The derivatives at the points that (T-150) needs; an empty list stands for derivatives that are all zero.
 #[derive(Clone, Debug, Default)]
 struct Points<const N: usize> {
     force_q: Vec<[[f64; N]; N]>,
     force_v: Vec<[[f64; N]; N]>,
     momentum_q: Vec<[[f64; N]; N]>,
-    /// One where it is constant.
+    /// The factored mass matrices: a single one where the mass matrix is constant.
     masses: Vec<Mass<N>>,
-    /// None where masses are alike.
+    /// The units in which convergence is also measured; `None` where the masses are of similar size.
     units: Option<[Units; N]>,
     mu: Vec<[f64; N]>,
-    /// What a loss has of the inside.
+    /// The derivatives of the loss by quantities inside the element.
     seeds: Seeds,
     pulled: Vec<[f64; N]>,
     rows: Vec<[f64; N]>,
 }
 
-/// L_vv, as it is divided by.
+/// L_vv in the form in which systems with it are solved.
 #[derive(Clone, Debug)]
 enum Mass<const N: usize> {
     Diagonal([f64; N]),
@@ -177,7 +180,7 @@ enum Mass<const N: usize> {
 }
 
 impl<const N: usize> Mass<N> {
-    /// None of a singular one.
+    /// `None` if the matrix is singular.
     fn of(matrix: &[[f64; N]; N]) -> Option<Self> {
         let mut rows = matrix.iter().enumerate();
         let is_diagonal = rows.all(|(a, row)| {
@@ -216,7 +219,7 @@ fn add_transposed<const N: usize>(matrix: &[[f64; N]; N], row: &[f64; N], sum: &
 }
 
 impl<const N: usize> Points<N> {
-    /// Those of an element; false if a mass matrix is singular.
+    /// Evaluates the derivatives at the points of an element; false if a mass matrix is singular.
     fn set<M: Model<N>>(
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,
@@ -270,7 +273,7 @@ impl<const N: usize> Points<N> {
         Ok(true)
     }
 
-    /// μ by iteration, with what goes to λ; false where that does not contract.
+    /// Solves (T-150) for μ by iteration and adds its contributions to λ; false where the iteration does not contract.
     fn iterate<M: Model<N>>(&mut self, equations: &VelocityForm<'_, M, N>, lambda: &[f64]) -> bool {
         let iteration = Iteration {
             points: self,
@@ -285,12 +288,13 @@ impl<const N: usize> Points<N> {
     }
 }
 
-/// √m and m of a coordinate, beside the largest: of a loss of coordinates alone m μ is of one size, where μ of a heavy body is small beside that of a light one.
+/// √m and m of a coordinate, relative to the largest mass. For a loss that depends on coordinates only, m μ is of
+/// similar size for all coordinates, whereas μ of a heavy body is small beside that of a light one.
 pub(crate) type Units = [f64; 2];
 
-/// The largest of some masses, where they are not much alike.
+/// The largest of several masses, if they differ much in size.
 pub(crate) fn largest_of_unlike(masses: &[f64]) -> Option<f64> {
-    /// Up to this multiple a digit is lost.
+    /// Up to this ratio, different masses cost no more than about one digit.
     const ALIKE: f64 = 16.0;
 
     let (mut least, mut largest) = (f64::INFINITY, 0.0_f64);
@@ -302,17 +306,17 @@ pub(crate) fn largest_of_unlike(masses: &[f64]) -> Option<f64> {
     is_unlike.then_some(largest)
 }
 
-/// Those of a mass.
+/// The units that belong to a mass.
 pub(crate) fn units(mass: f64, largest: f64) -> Units {
     let part = mass.abs() / largest;
     [Real::sqrt(part), part]
 }
 
-/// Whether the iteration of (T-150) goes on.
+/// Monitors the convergence of the iteration of (T-150).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Judge {
     before: f64,
-    /// The same in other units, as long as increments shrink there.
+    /// The last increments in the other [`Units`]; `None` once they have stopped shrinking there.
     others: [Option<f64>; 2],
     has_converged: bool,
 }
@@ -328,12 +332,14 @@ impl Default for Judge {
 }
 
 impl Judge {
-    /// Increments beside μ that are roundings.
+    /// Increments of this size, relative to μ, are rounding errors.
     const ROUNDING: f64 = 1e-16;
-    /// Each increment is at most this part of the one before, or factors cost less.
+    /// Each increment must be at most this fraction of the one before; otherwise LU factors of the tangent are cheaper.
     const CONTRACTION: f64 = 0.2;
 
-    /// Sees the largest increment of μ and the largest μ, and the same in other [`Units`], zeros where masses are alike; whether it has converged, once that is known. Other units prolong it alone.
+    /// Takes the largest increment of μ and the largest μ, and the same pair in the other [`Units`] (zeros where masses
+    /// are of similar size). Returns whether the iteration has converged, or `None` while that is undecided. The other
+    /// units can only prolong the iteration.
     #[inline(always)]
     pub(crate) fn see(
         &mut self,
@@ -364,7 +370,7 @@ impl Judge {
             return Some(true);
         }
         if !(increment <= Self::CONTRACTION * self.before) {
-            // Roundings do not shrink.
+            // Rounding errors do not shrink further.
             return Some(increment <= 64.0 * Self::ROUNDING * size);
         }
         self.before = increment;
@@ -379,7 +385,7 @@ struct Iteration<'a, 'e, M, const N: usize> {
     lambda: &'a [f64],
 }
 
-/// In wide registers, with the same roundings.
+/// Compiled for the widest registers of the processor, with the same roundings.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for Iteration<'_, '_, M, N> {
     type Output = bool;
@@ -390,7 +396,7 @@ impl<M: Model<N>, const N: usize> pulp::NullaryFnOnce for Iteration<'_, '_, M, N
 }
 
 impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
-    // Loops and no closures, which would be compiled for the instruction set of the crate.
+    // Plain loops instead of closures: a closure would be compiled for the instruction set of the crate.
     #[inline(always)]
     fn run(self) -> bool {
         let Points {
@@ -445,7 +451,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
                 masses[j.min(masses.len() - 1)].solve(&mut row);
                 for a in 0..N {
                     let change = (row[a] - mu[j][a]).abs();
-                    // A maximum would ignore what is not a number.
+                    // `f64::max` would ignore a NaN.
                     increment = if change > increment || change.is_nan() {
                         change
                     } else {
@@ -475,7 +481,7 @@ const fn has_velocities<M: Model<N>, const N: usize>() -> bool {
 }
 
 impl<const N: usize> Backwards<N> {
-    /// μ and the new λ by iteration, with what the element has of parameters; false where that does not contract, and λ stays.
+    /// Computes μ and the new λ by iteration; false, with λ unchanged, where the iteration does not contract.
     pub(crate) fn try_iteration<M: Model<N>>(
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,

@@ -12,7 +12,7 @@ pub const MAX_NODES: usize = 12;
 /// The largest number of coefficients of a rate: degree s − 1 ≤ 10.
 pub const MAX_RATES: usize = MAX_NODES - 1;
 
-/// No less than |∫₀^τ P_k(2σ − 1) dσ|: 1/(2k + 1), for |P_{k+1} − P_{k−1}| ≤ 2.
+/// An upper bound of |∫₀^τ P_k(2σ − 1) dσ|: 1/(2k + 1), because |P_{k+1} − P_{k−1}| ≤ 2.
 #[cfg(feature = "alloc")]
 pub(crate) const MOST_OF_INTEGRALS: [f64; MAX_NODES] = {
     let mut most = [1.0; MAX_NODES];

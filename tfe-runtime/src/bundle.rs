@@ -1,12 +1,14 @@
-//! Several trajectories of one model side by side: every kernel call serves eight of them.
+//! Several trajectories of one model side by side: each kernel call serves eight of them.
 //!
-//! The trajectories of a [`Bundle`] take the same steps at the same times. Eight at a time share the registers of the processor, and the fixed-point
-//! iteration of an element runs for all eight at once, each lane judged by the stopping rule of a [`Stepper`]: the same equations as those of a
-//! stepper, of second order where the model allows it. A lane that has converged is held while others go on, so that what a trajectory does never
-//! depends, not by one bit, on which others are beside it. A lane whose iteration does not contract takes this step and some that follow with a stepper of its own, by Newton's method; one that fails there is out.
+//! The trajectories of a [`Bundle`] take the same steps at the same times. Eight of them share the registers of the
+//! processor, and the fixed-point iteration of an element runs for all eight at once. Each lane has its own convergence
+//! test, that of a [`Stepper`], and the equations are those of a stepper, of second order where the model allows it. A
+//! converged lane is held while the others go on, so that the result of a trajectory does not depend, not even in one
+//! bit, on the trajectories beside it. A lane whose iteration does not contract is given a stepper of its own, which
+//! takes this step and some that follow by Newton's method; if that fails as well, the trajectory ends there.
 //!
-//! Lanes are used for models without constraints: any Lagrangian; Hamiltonians with two-field elements, and with all others where they are M q̈ = f. Everything
-//! else runs too, lane after lane.
+//! Lanes are used for models without constraints: for every Lagrangian; for Hamiltonians with two-field elements, and
+//! with all other elements if their equations have the form M q̈ = f. Everything else is stepped lane by lane.
 
 mod engine;
 mod first_order;
@@ -91,36 +93,37 @@ pub use varied::Varied;
 /// # }
 /// ```
 ///
-/// They are those of one model, or, [`of_models`](Self::of_models), of eight that differ in their parameters.
+/// All trajectories belong to one model or, with [`of_models`](Self::of_models), to up to eight that differ in their
+/// parameters.
 #[derive(Debug)]
 pub struct Bundle<'m, M, const N: usize, const W: usize, T = One<'m, M>> {
     models: T,
     table: SchemeTable,
     control: Control,
-    /// Of models and elements that can be stepped side by side.
+    /// Steps the lanes side by side; `None` for models and elements that do not allow it.
     engine: Option<Engine<N>>,
     groups: Vec<Group<N>>,
     fates: [Fate<'m, M, N>; W],
-    /// The lanes with a trajectory, as long as all of them have gone side by side.
+    /// The lanes that hold a trajectory; `None` once one of them has left the common iteration.
     calm: Option<[bool; W]>,
-    /// Statistics of steps in lanes.
+    /// The counts of steps taken side by side.
     together: Statistics,
-    /// Of steppers that are no more.
+    /// The counts of individual steppers that have been dropped.
     past: Statistics,
 }
 
-/// What has become of a trajectory.
+/// The state of one trajectory, and how it is stepped.
 #[derive(Debug)]
 struct Fate<'m, M, const N: usize> {
     failure: Option<StepError>,
     is_used: bool,
-    /// Whether it goes its own way, and for how many steps.
+    /// Whether it is stepped on its own, and for how many more steps.
     preference: Preference,
-    /// Few have one, and it is large.
+    /// Boxed, because few trajectories need one and it is large.
     stepper: Option<Box<Stepper<'m, M, N>>>,
 }
 
-// Not derived: the model is borrowed, it need not be `Clone`.
+// Not derived: the model is borrowed and need not be `Clone`.
 impl<M, const N: usize> Clone for Fate<'_, M, N> {
     fn clone(&self) -> Self {
         Self {
@@ -163,7 +166,7 @@ where
     /// An empty bundle.
     ///
     /// # Errors
-    /// [`ElementError`] if the element is none.
+    /// [`ElementError`] if the element is invalid.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
         Self::with(One(model), element, control)
     }
@@ -178,10 +181,11 @@ impl<'m, M, const N: usize> Bundle<'m, M, N, LANES, Varied<'m, M>>
 where
     M: Model<N>,
 {
-    /// An empty bundle of models that differ in their [parameters](Model::parameters) and in nothing [beside them](Model::unnumbered), all of them this one at first.
+    /// An empty bundle of models that may differ in their [parameters](Model::parameters), but in nothing
+    /// [else](Model::unnumbered); all lanes begin with this one.
     ///
     /// # Errors
-    /// [`ElementError`] if the element is none.
+    /// [`ElementError`] if the element is invalid.
     pub fn of_models(
         model: &'m M,
         element: Element,
@@ -190,7 +194,7 @@ where
         Self::with(Varied::new(model), element, control)
     }
 
-    /// Begins anew with these models and states, one a lane; those beyond the eighth are left out.
+    /// Starts again with these models and states, one for each lane; those beyond the eighth are ignored.
     pub fn start_with(&mut self, models: &'m [M], starts: &[State<N>]) {
         self.models.set(models);
         self.start(starts);
@@ -223,7 +227,8 @@ where
         })
     }
 
-    /// Whether this model with this element and control is stepped in lanes; else lane after lane, as by a [`Stepper`].
+    /// Whether this model is stepped in lanes with this element and control; if not, each lane is stepped by a
+    /// [`Stepper`].
     #[must_use]
     pub fn uses_lanes(element: &Element, control: &Control) -> bool {
         element.points() <= 4 * MAX_GROUPS
@@ -232,7 +237,7 @@ where
             && control.solve != Solve::Newton
     }
 
-    /// Begins anew with these states, one a lane; those beyond W are left out. Statistics go on.
+    /// Starts again with these states, one for each lane; those beyond W are ignored. The statistics are kept.
     pub fn start(&mut self, starts: &[State<N>]) {
         let (mut lanes, mut is_calm) = ([false; W], true);
         for (lane, fate) in self.fates.iter_mut().enumerate() {
@@ -253,7 +258,7 @@ where
         if let Some(engine) = &mut self.engine {
             engine.forget();
         }
-        // Lanes without a trajectory compute along with the first one; nobody looks at them.
+        // Lanes without a trajectory compute a copy of the first one; its result is not used.
         let first = starts.first().unwrap_or(&State::ZERO);
         for (k, group) in self.groups.iter_mut().enumerate() {
             for lane in 0..LANES {
@@ -267,11 +272,12 @@ where
         self.models.model(lane)
     }
 
-    /// Moves all trajectories from t to t + h; true if one of them failed in this step. One that has failed stays at its last good state.
+    /// Moves all trajectories from t to t + h; returns true if one of them failed in this step. A failed trajectory
+    /// stays at its last valid state.
     pub fn advance(&mut self, t: f64, h: f64) -> bool {
         let mut lanes = [false; W];
         let is_step = h.is_finite() && h != 0.0;
-        // Constant, so that nothing is compiled for models that never step like this.
+        // A constant, so that nothing is compiled for models that are never stepped in lanes.
         if const { M::CONSTRAINTS.is_empty() }
             && is_step
             && let Some(engine) = &mut self.engine
@@ -323,7 +329,7 @@ where
         if fate.stepper.is_none() {
             let model = self.models.model(lane);
             let stepper = Stepper::new(model, self.table.view().element, self.control);
-            // The element was good when the bundle was made.
+            // The element was validated when the bundle was made.
             fate.stepper = stepper.ok().map(Box::new);
         }
         if let Some(stepper) = &mut fate.stepper {
@@ -336,10 +342,10 @@ where
         Ok(())
     }
 
-    /// Where a trajectory is now.
+    /// The present state of a trajectory.
     ///
     /// # Errors
-    /// Why it stopped, if it did; [`StepError::NonFinite`] for a lane without a trajectory.
+    /// The reason why it stopped, if it did; [`StepError::NonFinite`] for a lane without a trajectory.
     pub fn state(&self, lane: usize) -> Result<State<N>, StepError> {
         match self.fates.get(lane) {
             Some(fate) if fate.is_used => match fate.failure {
@@ -350,7 +356,7 @@ where
         }
     }
 
-    /// What the steps so far have cost; a step of W trajectories counts W times.
+    /// The cost of all steps so far; a step of W trajectories counts W times.
     #[must_use]
     pub fn statistics(&self) -> Statistics {
         let mut sum = self.together;
@@ -363,7 +369,7 @@ where
         sum
     }
 
-    /// The same since the last call, or since the bundle was made.
+    /// The counts since the last call, or since the bundle was made.
     pub fn take_statistics(&mut self) -> Statistics {
         let mut sum = core::mem::take(&mut self.together);
         sum.merge(&core::mem::take(&mut self.past));

@@ -1,4 +1,5 @@
-//! The equations of an element, differentiated: its interior as a linear function of its start and of parameters (T-30).
+//! The linearised equations of an element: its interior unknowns as a linear function of its start and of parameters
+//! (T-30).
 //!
 //! With r(x, y₀, γ) = 0 for the interior rates x and y₁ = Y(x, y₀, γ) for the end,
 //!
@@ -6,8 +7,8 @@
 //! δx = X_y δy₀ + X_γ δγ ,     X = −(∂r/∂x)⁻¹ ∂r/∂(y₀, γ) ,     δy₁ = Y_x δx + Y_y δy₀ + Y_γ δγ .
 //! ```
 //!
-//! The rows are solved for x given the start; the interior block of a primal element, singular at isolated steps, is never
-//! inverted.
+//! The rows are solved for x at a given start. The interior block of the boundary-value form of a primal element, which
+//! is singular at isolated steps, is never inverted.
 
 use crate::dual::{Dual, duals};
 use crate::error::StepError;
@@ -17,30 +18,30 @@ use crate::phase_form::PhaseForm;
 use crate::scheme::SchemeRef;
 use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm, add_row};
 
-/// What a unit of a global unknown γ changes in one element, beside its start.
+/// The change of one element, besides that of its start, for a unit change of a global unknown γ.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Direction {
-    /// dt/dγ of the start of the element.
+    /// dt/dγ of the time at the start of the element.
     pub time: f64,
-    /// dh/dγ of its length.
+    /// dh/dγ of the length of the element.
     pub length: f64,
-    /// The parameter that γ is.
+    /// The parameter of the model that γ is, if it is one.
     pub parameter: Option<Parameter>,
-    /// Its part of the additional force along the velocities, Q += damping · γ v.
+    /// The factor of an additional force along the velocities, Q += damping · γ v.
     pub damping: f64,
 }
 
-/// A parameter of a model by which is differentiated.
+/// A parameter of a model by which derivatives are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
-    /// By its index in [`Model::SENSITIVITIES`], with the kernel [`Model::first_by`].
+    /// By index in [`Model::SENSITIVITIES`]; differentiated by the kernel [`Model::first_by`].
     Named(usize),
-    /// By its index among all, [`Model::parameter_name`], with dual numbers in the place of numbers.
+    /// By index among all parameters ([`Model::parameter_name`]); differentiated by dual numbers.
     Any(usize),
 }
 
 impl Parameter {
-    /// By its index among all.
+    /// Its index among all parameters.
     #[cfg(feature = "alloc")]
     pub(crate) fn any<M: Model<N>, const N: usize>(self, model: &M) -> Option<usize> {
         match self {
@@ -50,8 +51,9 @@ impl Parameter {
     }
 }
 
-/// The linear system of one element: tangent, residual, and the right sides, later the solutions: a row for each interior unknown, a column
-/// for each direction, first the 2N of the start, (p₀, q₀), then the others.
+/// The linear system of one element: tangent, residual and right-hand sides, which the solutions later replace. The
+/// sides have a row for each interior unknown and a column for each direction: first the 2N components of the start,
+/// (p₀, q₀), then the other directions.
 pub(crate) struct System<'a> {
     pub(crate) tangent: &'a mut [f64],
     pub(crate) pivots: &'a mut [usize],
@@ -59,9 +61,10 @@ pub(crate) struct System<'a> {
     pub(crate) sides: &'a mut [f64],
 }
 
-/// What the end of an element in velocity form depends on, as far as it is the momentum: derivatives of h Σ b F.
+/// The derivatives of h Σ b F, through which the momentum at the end of an element in velocity form depends on
+/// everything.
 pub(crate) struct EndForces<'a, const N: usize> {
-    /// By the interior, N rows.
+    /// By the interior unknowns, N rows.
     pub(crate) by_interior: &'a mut [f64],
     /// By the coordinates at the start.
     pub(crate) by_start: &'a mut [[f64; N]],
@@ -70,13 +73,13 @@ pub(crate) struct EndForces<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> EndForces<'a, N> {
-    /// The numbers that it needs for so many interior unknowns and directions.
+    /// The number of values needed for so many interior unknowns and directions.
     #[cfg(feature = "alloc")]
     pub(crate) const fn length(interior: usize, directions: usize) -> usize {
         N * (interior + N + directions)
     }
 
-    /// In memory of [`EndForces::length`] numbers.
+    /// Divides a slice of [`EndForces::length`] numbers into the three parts.
     pub(crate) fn of(memory: &'a mut [f64], interior: usize) -> Self {
         memory.fill(0.0);
         let (by_interior, rest) = memory.split_at_mut(N * interior);
@@ -90,12 +93,12 @@ impl<'a, const N: usize> EndForces<'a, N> {
 }
 
 impl System<'_> {
-    /// The number of columns of the sides.
+    /// The number of columns of the right-hand sides.
     fn columns(&self) -> usize {
         self.sides.len() / self.residual.len()
     }
 
-    /// Sets it up in phase space.
+    /// Sets up the system in phase space.
     pub(crate) fn of_phase<M, const N: usize>(
         &mut self,
         equations: &mut PhaseForm<'_, M, N>,
@@ -125,7 +128,7 @@ impl System<'_> {
             for (direction, column) in directions.iter().zip(2 * N..) {
                 let node = equations.scheme.nodes[k];
                 let explicit = explicit(equations.model, t, &q, &p, direction, node);
-                // The stage moves with h at a fixed interior.
+                // At fixed interior rates, the stage moves with h.
                 let row = k * points..(k + 1) * points;
                 let (forces, velocities) = x.as_chunks::<N>().0.split_at(points);
                 let (mut dp, mut dq) = ([0.0; N], [0.0; N]);
@@ -152,7 +155,7 @@ impl System<'_> {
         }
     }
 
-    /// Sets it up for velocities.
+    /// Sets up the system in velocity form.
     pub(crate) fn of_velocities<M, const N: usize>(
         &mut self,
         equations: &mut VelocityForm<'_, M, N>,
@@ -232,7 +235,7 @@ impl System<'_> {
         Ok(())
     }
 
-    /// Solves all sides.
+    /// Factors the tangent and solves for all right-hand sides.
     pub(crate) fn solve(self) -> Result<Self, StepError> {
         let (size, columns) = (self.residual.len(), self.columns());
         lu::factor(size, self.tangent, self.pivots).map_err(|singular| {
@@ -246,7 +249,8 @@ impl System<'_> {
 }
 
 impl<'a> System<'a> {
-    /// The product (T-127): one solution with the transposed factors, whatever the number of columns. The residual holds λᵀ ∂(end)/∂(interior); what is solved for is returned.
+    /// The adjoint solution of (T-127): a single solve with the transposed factors, whatever the number of columns. On
+    /// entry the residual holds λᵀ ∂(end)/∂(interior); the solution is returned.
     pub(crate) fn product(
         self,
         lambda: &mut [f64],
@@ -269,7 +273,8 @@ impl<'a> System<'a> {
     }
 }
 
-/// λᵀ ∂(end)/∂(interior) into `weights`, and what λ has of directions at a fixed interior, in phase space.
+/// Writes λᵀ ∂(end)/∂(interior) into `weights`, in phase space, together with the derivatives by the directions at
+/// fixed interior rates.
 pub(crate) fn phase_weights<const N: usize>(
     scheme: &SchemeRef<'_>,
     h: f64,
@@ -291,7 +296,7 @@ pub(crate) fn phase_weights<const N: usize>(
     }
 }
 
-/// The same for velocities, with what λ has of the coordinates at the start.
+/// The same in velocity form, with the derivatives by the coordinates at the start as well.
 pub(crate) fn velocity_weights<const N: usize>(
     scheme: &SchemeRef<'_>,
     h: f64,
@@ -327,7 +332,8 @@ impl<M, const N: usize> VelocityForm<'_, M, N>
 where
     M: Model<N>,
 {
-    /// What a direction changes at a point while velocities and start stay: the derivatives of the momentum and of the force.
+    /// The derivatives of the momentum and of the force at a point along a direction, at fixed velocities and a fixed
+    /// start.
     pub(crate) fn along(
         &self,
         l: usize,
@@ -361,7 +367,7 @@ where
             Form::Hamiltonian => {
                 let by = explicit(self.model, t, &q, &point.p, direction, node);
                 for a in 0..N {
-                    // The additional force is one of v, which stays.
+                    // The additional force is a function of v, which is held fixed.
                     of_force[a] = by.force[a] - by.q[a] + self.span.damping * by.z[a];
                     for b in 0..N {
                         of_momentum[a] -= second.zz[a][b] * by.z[b];
@@ -381,7 +387,8 @@ where
     }
 }
 
-/// The explicit derivative of first derivatives and forces, by time and parameter, at the place `node` ∈ [0, 1] of the element.
+/// The explicit derivatives of the first derivatives and of the forces by the time and the parameter, at the place
+/// `node` ∈ [0, 1] of the element.
 fn explicit<M, const N: usize>(
     model: &M,
     t: f64,
@@ -428,7 +435,8 @@ where
     sum
 }
 
-/// The derivatives of the end, row by row, with the columns of the sides; one beyond start and directions is a change of the interior alone.
+/// The derivatives of the end, row by row, with the columns of the right-hand sides. A column beyond those of start and
+/// directions is a change of the interior alone.
 ///
 /// ```text
 /// δy₁ = δy₀ + h Σ b δx + δh Σ b x
@@ -459,7 +467,7 @@ pub(crate) fn phase_ends<const N: usize>(
     }
 }
 
-/// The same for velocities:
+/// The same in velocity form:
 ///
 /// ```text
 /// δq₁ = δq₀ + h Σ β δν + δh Σ β ν ,     δp₁ = δp₀ + δ(h Σ b F) .
@@ -510,7 +518,7 @@ pub(crate) fn velocity_ends<const N: usize>(
 /// sum += weight · row
 #[inline(always)]
 pub(crate) fn add_multiple(sum: &mut [f64], weight: f64, row: &[f64]) {
-    // A loop and no iterators, which would be compiled for the instruction set of the crate.
+    // Plain loops instead of iterators, which would be compiled for the instruction set of the crate.
     let count = sum.len().min(row.len());
     let (sum, row) = (&mut sum[..count], &row[..count]);
     for a in 0..count {

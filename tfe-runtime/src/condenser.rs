@@ -1,13 +1,14 @@
-//! Elements of assembled problems: each linearised about an iterate, its interior condensed to its two nodes (T-81).
+//! Elements of assembled problems: each is linearised about the current iterate, and its interior is condensed to its
+//! two nodes (T-81).
 //!
-//! Periodic orbits and boundary-value problems have the nodes y₀ … y_E of all elements and the interior rates x of each as unknowns.
-//! Newton's method needs, at the current iterate,
+//! Periodic orbits and boundary-value problems have as unknowns the nodes y₀ … y_E of all elements and the interior
+//! rates x of each element. At the current iterate, Newton's method needs
 //!
 //! ```text
 //! y_{e+1} − A_e y_e − C_e γ = r_e ,         γ: the period, a parameter, …
 //! ```
 //!
-//! and, once the nodes are known, the interior. No element is solved by itself: all converge together.
+//! and the interior once the nodes are known. No element is solved by itself: nodes and interiors converge together.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -44,21 +45,24 @@ pub struct Placed<'a, const N: usize> {
     pub start: &'a State<N>,
     /// The interior rates x, [`Condenser::interior`] numbers.
     pub interior: &'a [f64],
-    /// γ of an additional force γ v along the velocities: what unfolds the families of periodic orbits of a conservative model; else zero.
+    /// The factor γ of an additional force γ v along the velocities, which unfolds the families of periodic orbits of a
+    /// conservative model; zero otherwise.
     pub damping: f64,
 }
 
-/// Where the parts of a condensed element are written.
+/// The memory into which a condensed element is written.
 #[derive(Debug)]
 pub struct Condensed<'a> {
-    /// A and C and, in the last column, what the end of the Newton step is beyond A δy₀ + C δγ: 2N rows of 2N + g + 1 columns,
-    /// ordered (p, q).
+    /// A and C and, in the last column, the difference between the end of the Newton step and A δy₀ + C δγ: 2N rows of
+    /// 2N + g + 1 columns, ordered (p, q).
     pub ends: &'a mut [f64],
-    /// The interior as a function of the nodes: a row of the same columns for each of the [`Condenser::interior`] numbers, the last one its own Newton step.
+    /// The interior as a linear function of the nodes: one row for each of the [`Condenser::interior`] numbers, with
+    /// the same columns; the last column is the Newton step of the interior itself.
     pub response: &'a mut [f64],
 }
 
-/// Linearises elements, on memory of its own. It holds no model, so that parameters may change between two calls.
+/// Linearises and condenses elements, on memory of its own. It holds no model, so that parameters may change between
+/// two calls.
 ///
 /// # Example
 /// One element, solved by Newton's method, and the derivative of its end by its start.
@@ -121,10 +125,10 @@ pub struct Condenser<const N: usize> {
 }
 
 impl<const N: usize> Condenser<N> {
-    /// For models of one type and one element, of any length.
+    /// A condenser for models of one type and elements of one kind, of any length in time.
     ///
     /// # Errors
-    /// [`ElementError`] if the element is none.
+    /// [`ElementError`] if the element is invalid.
     pub fn new<M: Model<N>>(element: Element) -> Result<Self, ElementError> {
         let table = SchemeTable::new(element)?;
         Ok(Self {
@@ -143,13 +147,13 @@ impl<const N: usize> Condenser<N> {
         self.interior
     }
 
-    /// What the linearisations so far have cost.
+    /// The cost of all linearisations so far.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
         self.memory.statistics()
     }
 
-    /// The interior of an element that follows a given curve, t ↦ (q, dq/dt).
+    /// The interior rates of an element that follows a given curve, t ↦ (q, dq/dt).
     ///
     /// # Errors
     /// [`LegendreError`] where a Hamiltonian model has no momentum for a velocity.
@@ -168,7 +172,7 @@ impl<const N: usize> Condenser<N> {
             let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
             let (_, v) = curve(time + length);
             interior[layout.end(0)..layout.node(0)].copy_from_slice(&v);
-            // A rod without tension holds nothing: the reactions of the curve belong to the guess.
+            // A rod without tension exerts no force: the reactions along the curve are part of the initial guess.
             let middle = time + 0.5 * length;
             let (q, v) = curve(middle);
             let state = legendre::state(model, middle, &q, &v)?;
@@ -201,7 +205,8 @@ impl<const N: usize> Condenser<N> {
     /// Linearises an element; with g directions the slices of `condensed` have (2N + g + 1) columns.
     ///
     /// # Errors
-    /// [`StepError`] if the length is none, a value is not finite, memory is short, or the tangent is singular.
+    /// [`StepError`] if the length is zero or not finite, a value is not finite, memory is short, or the tangent is
+    /// singular.
     pub fn linearise<M: Model<N>>(
         &mut self,
         model: &M,
@@ -338,7 +343,7 @@ impl<const N: usize> Condenser<N> {
             row[columns - 1] += value;
             sum += row.iter().map(|entry| 0.0 * entry).sum::<f64>();
         }
-        // Infinities and what is no number give no zero.
+        // Infinities and NaN do not sum to zero.
         if sum == 0.0 {
             Ok(())
         } else {
@@ -346,7 +351,8 @@ impl<const N: usize> Condenser<N> {
         }
     }
 
-    /// The polynomial of the element linearised last, from its first node to the one at time `next` with the state `end`.
+    /// The polynomial of the element linearised last, from its first node to the node at time `next` with the state
+    /// `end`.
     #[must_use]
     pub fn dense<M: Model<N>>(
         &self,
@@ -407,7 +413,7 @@ impl<const N: usize> Condenser<N> {
 }
 
 impl System<'_> {
-    /// Lets the last side be the Newton step of the interior itself.
+    /// Replaces the last right-hand side by that of the Newton step of the interior.
     fn with_newton_step(self) -> Self {
         let rows = self
             .sides

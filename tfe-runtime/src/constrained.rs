@@ -1,7 +1,8 @@
-//! Constraints: positions φ(q, t) = 0 and velocities A(q, t) v + a(q, t) = 0, kept by integrated multipliers (T-70 … T-79).
+//! Constraints: positions φ(q, t) = 0 and velocities A(q, t) v + a(q, t) = 0, enforced by integrated multipliers (T-70
+//! … T-79).
 //!
-//! Elements hold them exactly at their nodes; this module answers what belongs to one instant: the velocity of a constrained momentum,
-//! residuals, and which rows are independent.
+//! Elements satisfy them exactly at their nodes. This module treats a single instant: the velocity that belongs to a
+//! momentum under constraints, the residuals of the constraints, and which rows are linearly independent.
 
 pub(crate) mod choose;
 mod combine;

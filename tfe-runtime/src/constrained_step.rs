@@ -1,4 +1,4 @@
-//! Steps of constrained models.
+//! Steps of models with constraints, by Newton's method with multipliers.
 
 use crate::constrained::choose::choose;
 use crate::constrained::element::ConstrainedForm;
@@ -19,7 +19,7 @@ use crate::scheme::{SchemeRef, Tables};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Scratch, Workspace};
 
-/// Moves `state` over one element; as [`Method::advance`].
+/// Moves `state` over one element; see [`Method::advance`].
 pub(crate) fn advance<M, T, const N: usize>(
     method: &Method<'_, M, T>,
     memory: &mut Memory<N>,
@@ -78,7 +78,7 @@ where
             rows.combine_multipliers(&mut parts.unknowns[place]);
         }
     }
-    // A failure leaves nothing to continue from.
+    // After a failure there is no polynomial to continue from.
     memory.last = None;
     let low = if warm { memory.low } else { State::ZERO };
     let cold = |unknowns: &mut [f64],
@@ -100,7 +100,7 @@ where
     let mut start_velocity = [0.0; N];
     let end_places = layout.end(0)..layout.node(0);
     if warm {
-        // The last element has left it.
+        // The velocity at the end of the last element, which that element has left there.
         start_velocity.copy_from_slice(&parts.unknowns[end_places.clone()]);
         let rates = layout.rates();
         let end: [f64; N] = end_velocity(&scheme, parts.unknowns[..rates].as_chunks().0);
@@ -159,7 +159,7 @@ where
         Ok(evidence) => evidence,
         Err(error) if !warm => return Err(error),
         Err(_) => {
-            // The continued polynomial may be a worse start than none.
+            // The continued polynomial may be a worse initial guess than a constant velocity.
             form.constraints.rows.evaluate(method.model, t, &state.q);
             cold(
                 scratch.unknowns,
@@ -178,7 +178,7 @@ where
     }
     form.check_end(scratch.unknowns)?;
     let end_rows = form.constraints.rows.independence();
-    // Constraints that move do work.
+    // Constraints that depend on the time do work.
     let is_conserved = conserves_energy::<M, N>()
         && impulses.is_empty()
         && form.constraints.rows.drift.iter().all(|a| *a == 0.0);
@@ -188,7 +188,7 @@ where
     });
     let rounding = || rounding(method.model, (t, h), [state, &end]);
     evidence.check_with(method.control.solve, energy, element, &rounding)?;
-    // Between steps they are those of the constraints as declared.
+    // Between steps the rows are those of the constraints as declared.
     if form.constraints.rows.is_combined() {
         for place in layout.multipliers() {
             form.constraints
@@ -210,14 +210,14 @@ where
     Ok(())
 }
 
-/// A constant velocity, and no reactions.
+/// The initial guess of constant velocity and zero reactions.
 fn constant<const N: usize>(layout: &Layout, v: &[f64; N], unknowns: &mut [f64]) {
     unknowns.fill(0.0);
     unknowns[..layout.rates()].as_chunks_mut().0.fill(*v);
     unknowns[layout.end(0)..layout.node(0)].copy_from_slice(v);
 }
 
-/// The mean of the rates: those that continue the last element, or none yet.
+/// The mean of the rates, which are those continued from the last element or a cold start.
 fn mean_rate<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64; N] {
     let mut mean = [0.0; N];
     for (weight, rate) in scheme.advance.iter().zip(rates) {
@@ -228,7 +228,7 @@ fn mean_rate<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64
     mean
 }
 
-/// Combines rows that depend on one another, for an element with that mean rate.
+/// Replaces linearly dependent rows by combinations, for an element with this mean rate.
 fn combine<M, const N: usize>(
     model: &M,
     rows: &mut Rows<'_, N>,
@@ -251,10 +251,10 @@ fn combine<M, const N: usize>(
     rows.combine(model, places, rate, active);
 }
 
-/// The polynomial of the rates at the end of the element.
+/// The velocity at the end of the element, from the polynomial of the rates.
 fn end_velocity<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64; N] {
     let mut v = [0.0; N];
-    // Every Legendre polynomial is one at the end.
+    // Every Legendre polynomial is one at τ = 1.
     for weights in scheme.rate.chunks_exact(rates.len()) {
         for (weight, rate) in weights.iter().zip(rates) {
             for a in 0..N {
@@ -265,7 +265,7 @@ fn end_velocity<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [
     v
 }
 
-/// Refuses a start that is not on the constraints.
+/// Refuses a start that violates the constraints.
 fn check_start<M, const N: usize>(
     model: &M,
     t: f64,

@@ -1,27 +1,29 @@
-//! What iterations are allowed, and what is asked of them.
+//! The choice of iteration, its tolerance, and the limit on the number of iterations.
 
 /// How the equations of an element are solved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Solve {
-    /// Fixed point while it contracts well, else Newton; straight Newton for linear models.
+    /// Fixed-point iteration while it contracts well, otherwise Newton's method; Newton's method from the start for
+    /// linear models.
     #[default]
     Auto,
-    /// Fixed point only: first derivatives suffice, but a stiff model fails.
+    /// Fixed-point iteration only: needs first derivatives only, but fails for stiff models.
     FixedPoint,
-    /// Newton only.
+    /// Newton's method only.
     Newton,
-    /// As [`Auto`](Self::Auto), but whatever an iteration converges to is taken. Elsewhere Newton's method has to contract from its first iteration on, so that
-    /// what it finds lies near where it began; a step in which it does not is cut (`docs/theory.md` §10.6).
+    /// As [`Auto`](Self::Auto), but any converged iteration is accepted. With the other choices, Newton's method must
+    /// contract from its first iteration on, so that the root lies near the initial guess; a step in which it does not
+    /// is cut (`docs/theory.md` §10.6).
     Trusting,
 }
 
 impl Solve {
-    /// Whether steps that fail are cut.
+    /// Whether steps that fail are divided into shorter ones.
     pub(crate) fn cuts(self) -> bool {
         matches!(self, Self::Auto | Self::Newton)
     }
 
-    /// The same, which takes whatever an iteration converges to, if it is to choose.
+    /// With `all`, the choice that accepts any converged iteration, if the method is chosen automatically.
     #[cfg(feature = "alloc")]
     pub(crate) fn trusting(self, all: bool) -> Self {
         match (self, all) {
@@ -31,19 +33,20 @@ impl Solve {
     }
 }
 
-/// What the iterations are allowed, and what is asked of them.
+/// How the equations of an element are solved: tolerance, limit of iterations, and kind of iteration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Control {
-    /// The error that may be left, relative to the state, judged by the last increments. An
-    /// iteration that has reached round-off is accepted in any case.
+    /// The error that may remain, relative to the state, estimated from the last increments. An iteration that has
+    /// reached round-off is accepted in any case.
     pub tolerance: f64,
-    /// The most iterations of one element.
+    /// The largest number of iterations for one element.
     pub max_iterations: u32,
-    /// Which iteration.
+    /// The kind of iteration.
     pub solve: Solve,
 }
 
-/// Iterations with constraints leave no more, whatever is asked for: what violates constraints by much is no start of the next element.
+/// An upper bound of the tolerance for models with constraints: a larger violation would make the end of an element an
+/// inadmissible start of the next one.
 const MOST_WITH_CONSTRAINTS: f64 = 0.1 * START_TOLERANCE;
 
 impl Control {
@@ -55,7 +58,7 @@ impl Control {
     }
 }
 
-/// Steps whose iteration may end above it need no more than the working precision.
+/// Above this tolerance, the end of a step needs no more than working precision.
 const ROUGH: f64 = 1e-14;
 
 impl Control {
@@ -66,7 +69,8 @@ impl Control {
 
 impl Control {
     pub(crate) const DEFAULT: Self = Self {
-        // Well below one rounding: what a fixed point leaves has the same sign in element after element and adds up, roundings do not.
+        // Well below one rounding error: the remainder of a fixed-point iteration has the same sign in one element
+        // after the other and accumulates, whereas rounding errors do not.
         tolerance: 0.05 * f64::EPSILON,
         max_iterations: 100,
         solve: Solve::Auto,
@@ -79,8 +83,10 @@ impl Default for Control {
     }
 }
 
-/// Where Newton's method moves coordinates by less than that, relative to them, it is the rounding of constraints, summed over the points of an element.
+/// Below this, relative to the coordinates, a correction of Newton's method is the rounding error of the constraints,
+/// summed over the points of an element.
 pub(crate) const POSITION_ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
-/// How far a start may be off, relative to the extent of the motion. The first element takes the rest away.
+/// How much a start may violate the constraints, relative to the extent of the motion. The first element removes the
+/// rest.
 pub const START_TOLERANCE: f64 = 1e-8;

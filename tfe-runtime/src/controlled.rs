@@ -1,4 +1,4 @@
-//! Models with inputs: numbers given at run time.
+//! Models with inputs, whose values are given at run time.
 
 use crate::model::{By, First, Model, Second};
 use crate::real::Real;
@@ -8,8 +8,9 @@ pub const MAX_INPUTS: usize = 16;
 
 /// The kernels of a model with inputs u: L(q, v, t, u) or H(q, p, t, u), forces Q(q, z, t, u) and observables.
 ///
-/// Implemented by `#[dynamics]` where `input(…)` stands; the model itself, as a [`Model`], is the one all of whose inputs are zero. Every kernel is that of [`Model`] with
-/// the inputs before its other arguments, in the order of [`INPUTS`](Self::INPUTS); entries beyond them are not read.
+/// `#[dynamics]` implements it for declarations with `input(…)`. The model itself, as a [`Model`], is the one all of
+/// whose inputs are zero. Each kernel is that of [`Model`] with the inputs as an additional argument before the others,
+/// in the order of [`INPUTS`](Self::INPUTS); further entries are not read.
 pub trait Controlled<const N: usize>: Model<N> + Send + Sync {
     /// The names of the inputs, in order.
     const INPUTS: &'static [&'static str];
@@ -67,7 +68,7 @@ pub trait Controlled<const N: usize>: Model<N> + Send + Sync {
     ) {
     }
 
-    /// The observables, one for each column.
+    /// The observables, one value for each column.
     fn observables_with<R: Real>(
         &self,
         _inputs: &[R; MAX_INPUTS],

@@ -1,27 +1,27 @@
-//! Steps in halves, where the whole one fails (T-116).
+//! Steps in halves, where the whole step fails (T-116).
 
 use crate::control::Solve;
 use crate::error::StepError;
 use core::convert::Infallible;
 
-/// A step is halved so many times before it fails.
+/// The number of times a step is halved before it fails.
 const MAX_HALVINGS: u32 = 10;
 
-/// Something that acts at one instant of a step.
+/// Something that acts at one instant of a step, such as an impulse.
 pub(crate) trait Instant: Clone {
     fn time(&self) -> f64;
 }
 
-/// Nothing acts.
+/// For models on which nothing acts.
 impl Instant for Infallible {
     fn time(&self) -> f64 {
         match *self {}
     }
 }
 
-/// Some of what acts.
+/// A list from which the elements of a piece can be chosen.
 pub(crate) trait Kicks<K>: AsRef<[K]> {
-    /// Those that are chosen.
+    /// The elements of `from` for which `choice` holds.
     fn chosen(from: &[K], choice: &dyn Fn(&K) -> bool) -> Self;
 }
 
@@ -32,20 +32,20 @@ impl<K: Clone> Kicks<K> for alloc::vec::Vec<K> {
     }
 }
 
-/// None, without an allocator.
+/// An empty list, for use without an allocator.
 impl Kicks<Infallible> for [Infallible; 0] {
     fn chosen(_: &[Infallible], _: &dyn Fn(&Infallible) -> bool) -> Self {
         []
     }
 }
 
-/// What moves a state over one element.
+/// A stepper whose steps can be divided.
 pub(crate) trait Halving {
     type State;
     type Kick: Instant;
     type Kicks: Kicks<Self::Kick>;
 
-    /// Moves `state` from t to t + h by one element; leaves it where it is if that fails.
+    /// Moves `state` from t to t + h by one element; leaves it unchanged if that fails.
     fn whole(
         &mut self,
         t: f64,
@@ -54,11 +54,11 @@ pub(crate) trait Halving {
         kicks: &[Self::Kick],
     ) -> Result<(), StepError>;
 
-    /// A piece that went well.
+    /// Called for each piece that has succeeded.
     fn passed(&mut self, t: f64, h: f64, kicks: Self::Kicks);
 }
 
-/// Whether a shorter step may go well where one has failed with `error`.
+/// Whether a shorter step may succeed where one has failed with `error`.
 pub(crate) fn may_be_cut(error: &StepError, linear: bool, solve: Solve) -> bool {
     let is_of_the_iteration = matches!(
         error,
@@ -72,7 +72,8 @@ pub(crate) fn may_be_cut(error: &StepError, linear: bool, solve: Solve) -> bool 
     is_of_the_iteration && !linear && solve.cuts()
 }
 
-/// Moves `state` from t to t + h in two halves, and these in halves where they need it; false where the shortest pieces fail, too.
+/// Moves `state` from t to t + h in two halves, which are halved again where necessary; false if even the shortest
+/// pieces fail.
 #[cold]
 pub(crate) fn in_halves<S: Halving>(
     stepper: &mut S,

@@ -1,4 +1,4 @@
-//! The solution between the nodes: integrated rates (T-69).
+//! Dense output: the solution between the nodes as the integral of the rates (T-69).
 
 #[cfg(feature = "std")]
 pub(crate) mod bounds;
@@ -15,27 +15,27 @@ use crate::scheme::{MAX_RATES, SchemeRef};
 
 /// One element of a motion, to be evaluated anywhere inside.
 ///
-/// Coordinates and momenta are polynomials of degree n − 1 that begin and end at the states of the
-/// nodes, so that the curve is continuous; between nodes their error is of the order hⁿ. Where impulses act at a node momenta jump there: they begin
-/// behind those at the start, and end before those at the end.
+/// Coordinates and momenta are polynomials of degree n − 1 that begin and end at the states of the nodes, so that the
+/// curve is continuous; between nodes their error is of order hⁿ. Where impulses act at a node, the momenta jump there:
+/// the polynomials begin after the impulses at the start and end before those at the end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DenseElement<const N: usize> {
     times: (f64, f64),
-    /// Between the times: the step, whose digits their difference does not have far from zero.
+    /// The length of the step: far from t = 0 it has more correct digits than the difference of the times.
     length: f64,
-    /// Behind the impulses that act there.
+    /// The state at the start, after the impulses that act there.
     start: State<N>,
     end: State<N>,
-    /// Whether impulses act at the end, before which the polynomials end.
+    /// Whether impulses act at the end; the polynomials end before them.
     jumps: bool,
-    /// Legendre coefficients of h dq/dt, then those of h dp/dt.
+    /// The Legendre coefficients of h dq/dt, then those of h dp/dt.
     rates: Box<[[f64; N]]>,
-    /// Of an element that was cut: its pieces; else nothing.
+    /// The pieces of an element that was cut; empty otherwise.
     pieces: Box<[Self]>,
 }
 
 impl<const N: usize> DenseElement<N> {
-    /// An element in which nothing happens.
+    /// An element with a constant state.
     pub(crate) fn constant(start: f64, end: f64, state: State<N>) -> Self {
         Self {
             times: (start, end),
@@ -48,7 +48,7 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
-    /// An element whose ends alone are known: NaN between them.
+    /// An element of which only the ends are known; NaN between them.
     pub(crate) fn unknown(scheme: &SchemeRef<'_>, times: (f64, f64), last: &Last<N>) -> Self {
         Self {
             times,
@@ -61,10 +61,10 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
-    /// An element that was cut (T-116), from time `start` to time `end`.
+    /// An element that was cut (T-116), from time `start` to time `end`, made of its pieces.
     pub(crate) fn of_pieces((start, end): (f64, f64), mut pieces: Vec<Self>) -> Option<Self> {
         let last = pieces.last_mut()?;
-        // Nodes of a run are what its mesh says, to the bit.
+        // The nodes of a run are exactly those of its mesh.
         last.times.1 = end;
         let after = last.end;
         let before = pieces[0].start;
@@ -80,7 +80,7 @@ impl<const N: usize> DenseElement<N> {
         })
     }
 
-    /// Its pieces: the element itself, unless the step was [cut](crate::Statistics::cuts).
+    /// The pieces of the element: the element itself, unless the step was [cut](crate::Statistics::cuts).
     #[must_use]
     pub fn pieces(&self) -> &[Self] {
         if self.pieces.is_empty() {
@@ -146,8 +146,9 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
-    /// Of a constrained element: momenta jump at its nodes, so their polynomial is made from those at the points, with what is missing at
-    /// the ends spread by ½(P_s ± P_{s−1}), which vanish (nearly) at the points (T-79).
+    /// The polynomials of an element with constraints. Momenta jump at its nodes, so their polynomial is made from the
+    /// momenta at the points; the differences at the ends are distributed by ½(P_s ± P_{s−1}), which vanish (nearly) at
+    /// the points (T-79).
     pub(crate) fn constrained(
         scheme: &SchemeRef<'_>,
         times: (f64, f64),
@@ -160,7 +161,8 @@ impl<const N: usize> DenseElement<N> {
         let mut coefficients = vec![[0.0; N]; 2 * count].into_boxed_slice();
         let (q, p) = coefficients.split_at_mut(count);
         project(scheme.rate, rates, h, q);
-        // Legendre coefficients of the momentum: the polynomial of degree s − 1 through the points, or the nearest one.
+        // The Legendre coefficients of the momentum: the polynomial of degree s − 1 through the points, or the best
+        // approximation.
         let mut values = vec![[0.0; N]; count + 1];
         for ((node, weight), momentum) in scheme.nodes.iter().zip(scheme.weights).zip(momenta) {
             let mut legendre_values = [0.0; MAX_NODES];
@@ -201,7 +203,7 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
-    /// The same with impulses behind the end of its polynomials, which lead to a state.
+    /// The same element, with impulses at its end that lead to the given state.
     pub(crate) fn ending_in(self, end: State<N>) -> Self {
         Self {
             jumps: self.end != end,
@@ -210,13 +212,14 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
-    /// The Legendre coefficients of dq/dτ, then those of dp/dτ; none of an element that was cut, whose [pieces](Self::pieces) have them.
+    /// The Legendre coefficients of dq/dτ, then those of dp/dτ; empty for an element that was cut, whose
+    /// [pieces](Self::pieces) have them.
     #[must_use]
     pub fn coefficients(&self) -> &[[f64; N]] {
         &self.rates
     }
 
-    /// The parts before and after a time inside.
+    /// The parts before and after a time inside the element.
     pub(crate) fn split(&self, time: f64) -> (Self, Self) {
         let tau = (time - self.times.0) / (self.times.1 - self.times.0);
         let node = self.at(tau);
@@ -225,7 +228,7 @@ impl<const N: usize> DenseElement<N> {
         (before, after)
     }
 
-    /// The same polynomials between two places, by other coefficients.
+    /// The part of the polynomials between two places, with coefficients of its own.
     fn part(
         &self,
         (from, to): (f64, f64),
@@ -265,7 +268,8 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
-    /// The degree of its polynomials: the number of points at which an element of collocation meets the equations of motion.
+    /// The degree of the polynomials: the number of points at which a collocation element satisfies the equations of
+    /// motion.
     #[must_use]
     pub fn degree(&self) -> usize {
         self.pieces()[0].rates.len() / 2
@@ -283,13 +287,13 @@ impl<const N: usize> DenseElement<N> {
         self.times.1
     }
 
-    /// How long it is: the difference of both times, and where the step has more digits, as far from zero, the step.
+    /// The length of the element: the difference of both times or, where that has lost digits far from t = 0, the step.
     #[must_use]
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// The state at τ ∈ [0, 1]: exactly that of the nodes at both ends, with impulses that act there.
+    /// The state at τ ∈ [0, 1]. At both ends it is exactly that of the node, with the impulses that act there.
     #[must_use]
     pub fn at(&self, tau: f64) -> State<N> {
         if tau == 1.0 {
@@ -341,16 +345,16 @@ impl<const N: usize> DenseElement<N> {
         }
     }
 
-    /// The piece of an element that was cut.
+    /// The piece of an element that was cut that contains this time.
     fn piece_at(&self, time: f64) -> Option<&Self> {
         piece_at(&self.pieces, |piece| piece.times.0, self.times, time)
     }
 }
 
-/// The length of an element between two times that was made by the step `h`: the step if the times are as far apart but for rounding, which is a large part of a short step far
-/// from zero.
+/// The length of an element between two times that was made by the step `h`. It is the step if the difference of the
+/// times agrees with it up to rounding, which is a large part of a short step far from t = 0.
 pub(crate) fn length((start, end): (f64, f64), h: f64) -> f64 {
-    // Steps begin and end at breaks some roundings short of them.
+    // Steps may begin and end a few rounding errors before breakpoints.
     let rounding = 16.0 * f64::EPSILON * start.abs().max(end.abs()).max(h.abs());
     let between = end - start;
     if (between - h).abs() <= rounding {
@@ -360,7 +364,8 @@ pub(crate) fn length((start, end): (f64, f64), h: f64) -> f64 {
     }
 }
 
-/// The piece that holds a time, of an element between two times that was cut; `start` is where a piece begins.
+/// The piece that contains a time, of an element between two times that was cut; `start` gives the time at which a
+/// piece begins.
 pub(crate) fn piece_at<P>(
     pieces: &[P],
     start: impl Fn(&P) -> f64,
@@ -382,7 +387,7 @@ fn project<const N: usize>(
         .iter_mut()
         .zip(matrix.chunks_exact(values.len()))
     {
-        // Apart from the row, so that the sum stays in registers.
+        // A local copy of the row, so that the sum stays in registers.
         let mut sum = *row;
         for (weight, value) in weights.iter().zip(values) {
             for a in 0..N {

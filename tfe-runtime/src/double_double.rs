@@ -1,9 +1,9 @@
-//! Numbers of twice the precision, in constant functions.
+//! Numbers of twice the working precision, in constant functions.
 //!
-//! The tables of an element are computed once, with about 31 digits, and rounded once: a coefficient
-//! that is wrong in its last digit is wrong in every step, and the error adds up instead of
-//! averaging out. Only the algorithms of Dekker and Knuth are used (no fused multiply-add), hence
-//! compile-time and run-time evaluation give the same digits.
+//! The tables of an element are computed once, with about 31 digits, and rounded once: an error in the last digit of a
+//! coefficient would be the same in every step, and would accumulate instead of averaging out. Only the algorithms of
+//! Dekker and Knuth are used, without fused multiply-adds, so that evaluation at compile time and at run time gives the
+//! same digits.
 
 /// An unevaluated sum high + low with |low| ≤ ulp(high)/2.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +47,7 @@ impl DoubleDouble {
         }
     }
 
-    /// a · b exactly, by splitting both into halves of 26 bits.
+    /// a · b exactly, by splitting both factors into halves of 26 bits.
     pub(crate) const fn product(a: f64, b: f64) -> Self {
         const SPLIT: f64 = 134_217_729.0; // 2²⁷ + 1
         let (at, bt) = (SPLIT * a, SPLIT * b);

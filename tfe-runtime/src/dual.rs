@@ -1,15 +1,16 @@
-//! Numbers with a derivative: one kernel call gives the values and their derivative along one direction.
+//! Dual numbers: one kernel call gives the values and their derivatives along one direction.
 //!
-//! Constraints and forces may depend on the time and on parameters in any way; what a moving instant or another parameter changes comes from here, so that generated
-//! code needs no kernels for it.
+//! Constraints and forces may depend on the time and on parameters in any way. Their derivatives by these are computed
+//! with dual numbers, so that no kernels need to be generated for them.
 
 use crate::real::Real;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// x + ε x′ with ε² = 0.
 ///
-/// Kernels given such numbers for t, q and z differentiate along the slopes of their arguments. The time may carry a [parameter](Self::by_parameter) besides: kernels
-/// make their parameters of it, and that one of slope 1.
+/// A kernel called with dual numbers for t, q and z differentiates along the slopes of its arguments. The time may in
+/// addition carry the index of a [parameter](Self::by_parameter): kernels make their parameters from the time argument,
+/// and this one gets the slope 1.
 ///
 /// ```
 /// use tfe_runtime::Real;
@@ -26,25 +27,26 @@ pub struct Dual<S = f64> {
     pub value: S,
     /// x′
     pub slope: S,
-    /// The parameter of slope 1, on the time that a kernel is given.
+    /// The index of the parameter with slope 1; carried by the time argument of a kernel.
     parameter: Option<usize>,
 }
 
-/// Numbers over which there are [dual numbers](Dual).
+/// Scalars over which [dual numbers](Dual) can be formed.
 pub trait Differentiable: Real {
-    /// The slope of a choice between two branches, from theirs.
+    /// The slope of the result of `select`, from the slopes of both branches.
     #[must_use]
     fn slope_of_choice(mask: Self::Mask, then: Self, otherwise: Self) -> Self {
         Self::select(mask, then, otherwise)
     }
 
-    /// f′ x′, of a slope x′; zero where the slope is: an infinite derivative (√0) is no derivative along such a direction.
+    /// f′ x′ for a slope x′ (`self`); zero where the slope is zero, even if f′ is infinite (as of √ at 0): along such a
+    /// direction nothing changes.
     #[must_use]
     fn times_derivative(self, derivative: Self) -> Self {
         unless_zero(self, derivative * self)
     }
 
-    /// x′/r, of a slope x′ that vanishes where r does; zero where the slope is.
+    /// x′/r for a slope x′ (`self`) that vanishes where r does; zero where the slope is zero.
     #[must_use]
     fn over_length(self, length: Self) -> Self {
         unless_zero(self, self / length)
@@ -53,7 +55,8 @@ pub trait Differentiable: Real {
 
 impl Differentiable for f64 {}
 
-/// Dual numbers over dual numbers have second derivatives: with slopes along x and along y, the slope of the slope is ∂²/∂x∂y.
+/// Dual numbers over dual numbers give second derivatives: with slopes along x and along y, the slope of the slope is
+/// ∂²/∂x∂y.
 ///
 /// ```
 /// use tfe_runtime::Real;
@@ -73,11 +76,12 @@ impl<S: Differentiable> Differentiable for Dual<S> {
         )
     }
 
-    /// The slope of f′ x′ is that of f′ times x′, and f′ times that of x′: the latter also where x′ is zero, as that of x y at x = 0.
+    /// By the product rule, the slope of f′ x′ is (f′)′ x′ + f′ (x′)′; the second term counts also where x′ is zero, as
+    /// for x y at x = 0.
     fn times_derivative(self, derivative: Self) -> Self {
         let of_derivative = self.value.times_derivative(derivative.slope);
         let of_slope = self.slope.times_derivative(derivative.value);
-        // An infinite derivative is none here, either.
+        // Here, too, an infinite derivative counts as zero along a direction in which nothing changes.
         let is_finite = (derivative.value.abs()).less_or_equal(number(f64::MAX));
         Self::new(
             self.value.times_derivative(derivative.value),
@@ -108,7 +112,8 @@ impl<S: Copy> Dual<S> {
         }
     }
 
-    /// A time with which kernels differentiate by the parameter of this index, [`Model::parameter_name`](crate::Model::parameter_name), besides.
+    /// A time argument with which kernels also differentiate by the parameter of this index,
+    /// [`Model::parameter_name`](crate::Model::parameter_name).
     #[must_use]
     pub const fn by_parameter(self, parameter: Option<usize>) -> Self {
         Self { parameter, ..self }
@@ -122,24 +127,24 @@ impl<S: Differentiable> Dual<S> {
     }
 }
 
-/// A number; zero where another is.
+/// `otherwise`, or zero where `other` is zero.
 fn unless_zero<S: Real>(other: S, otherwise: S) -> S {
     let zero = S::from_f64(0.0);
     S::select(other.abs().less_or_equal(zero), zero, otherwise)
 }
 
-/// (1 − x)(1 + x), which has all digits near ±1.
+/// (1 − x)(1 + x), without loss of digits near ±1.
 pub(crate) fn below_one<S: Real>(x: S) -> S {
     let one = number::<S>(1.0);
     (one - x) * (one + x)
 }
 
-/// A number without slope.
+/// A constant: a number with slope zero.
 fn number<S: Real>(value: f64) -> S {
     S::from_f64(value)
 }
 
-/// A vector whose slopes are given.
+/// A vector of dual numbers with given slopes.
 #[must_use]
 pub fn duals<const N: usize>(values: &[f64; N], slopes: &[f64; N]) -> [Dual; N] {
     let mut duals = [Dual::ZERO; N];
@@ -208,8 +213,8 @@ impl<S: Differentiable> Real for Dual<S> {
         let is_it = self.parameter == Some(index);
         Self::new(number(value), number(f64::from(u8::from(is_it))))
     }
-    /// The slope is that of a difference over a distance at which its two errors, of second order and of rounding, are alike: good to some 1e-10 of what the function
-    /// does in a unit of its argument.
+    /// The slope is a central difference whose truncation error and rounding error are balanced: accurate to about
+    /// 1e-10 of the change of the function over a unit of its argument.
     fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
         const DISTANCE: f64 = 6e-6;
         let value = self.value.map(function);
@@ -255,7 +260,7 @@ impl<S: Differentiable> Real for Dual<S> {
     fn atan2(self, x: Self) -> Self {
         let square = x.value * x.value + self.value * self.value;
         let slope = (x.value * self.slope - self.value * x.slope) / square;
-        // Left of the origin there is a jump.
+        // To the left of the origin the function jumps.
         let zero = number(0.0);
         let across = S::slope_of_choice(self.value.less(zero), slope, slope);
         let slope = S::slope_of_choice(x.value.less(zero), across, slope);
@@ -332,7 +337,7 @@ impl<S: Differentiable> Real for Dual<S> {
         let value = Real::powf(self.value, exponent.value);
         let by_base = exponent.value * Real::powf(self.value, exponent.value - number(1.0));
         let mut result = self.chain(value, by_base);
-        // Where the power vanishes the logarithm is infinite, and the slope zero.
+        // Where the power vanishes, the logarithm is infinite and the slope zero.
         let by_exponent = unless_zero(value, value * Real::ln(self.value));
         result.slope += exponent.slope.times_derivative(by_exponent);
         result

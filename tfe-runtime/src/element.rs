@@ -1,11 +1,11 @@
-//! The elements by name: families, number of nodes, rule of integration.
+//! The elements: family, number of nodes, quadrature rule.
 
 use core::fmt;
 
 use crate::basis::MAX_NODES;
 use crate::quadrature::{MAX_POINTS, Quadrature};
 
-/// Which spaces an element is built on; s = nodes − 1.
+/// The spaces on which an element is built; s = nodes − 1.
 ///
 /// | family | trial | test | boundary jumps |
 /// |---|---|---|---|
@@ -22,13 +22,13 @@ pub enum Family {
     Mixed,
     /// Three-field form: coordinates, velocities and momenta are unknowns of their own.
     ThreeField,
-    /// The spaces of the two-field form exchanged.
+    /// Two-field form with trial and test spaces exchanged.
     EnergyConserving,
     /// Two-field form with a jump on the left side only.
     Radau,
 }
 
-/// Trial and test space of a two-field family and its boundary jumps.
+/// The trial and test spaces of a two-field family, and its boundary jumps.
 pub(crate) struct Spaces {
     /// Number of trial polynomials.
     pub(crate) trials: usize,
@@ -39,12 +39,12 @@ pub(crate) struct Spaces {
 }
 
 impl Family {
-    /// Whether coordinates of degree s and their derivatives are the unknowns.
+    /// Whether the unknowns are coordinates of degree s and their derivatives.
     pub(crate) const fn is_by_displacements(self) -> bool {
         matches!(self, Self::Primal | Self::ThreeField)
     }
 
-    /// Whether energy that a model conserves may get lost.
+    /// Whether energy that the model conserves may be lost.
     pub(crate) const fn damps(self) -> bool {
         matches!(self, Self::Radau)
     }
@@ -54,7 +54,7 @@ impl Family {
         let (trials, tests, left_jump, right_jump) = match self {
             Self::Mixed => (s, s + 1, true, true),
             Self::Radau => (s, s, true, false),
-            // A primal element is no two-field form; its q alone is continuous like this.
+            // A primal element is not a two-field form; only its q is continuous in this way.
             Self::EnergyConserving | Self::Primal | Self::ThreeField => (s + 1, s, false, false),
         };
         Spaces {
@@ -65,7 +65,7 @@ impl Family {
         }
     }
 
-    /// The name of its marker.
+    /// The name of the marker type.
     const fn name(self) -> &'static str {
         match self {
             Self::Primal => "Primal",
@@ -77,21 +77,21 @@ impl Family {
     }
 }
 
-/// Where the forces of an element are evaluated.
+/// The quadrature rule: where the forces of an element are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rule {
-    /// What suits the family: `Primal` n Gauss points, `Mixed` and `ThreeField`
-    /// n − 1 Gauss points, `EnergyConserving` 2n Gauss points, `Radau` n − 1 right Radau points.
+    /// The rule that suits the family: `Primal` n Gauss points, `Mixed` and `ThreeField` n − 1 Gauss points,
+    /// `EnergyConserving` 2n Gauss points, `Radau` n − 1 right Radau points.
     Default,
-    /// So many Gauss points.
+    /// This many Gauss points.
     Gauss(usize),
-    /// So many Lobatto points, the ends included.
+    /// This many Lobatto points, the ends included.
     Lobatto(usize),
 }
 
-/// A finite element in time: family, number of nodes, rule of integration.
+/// A finite element in time: family, number of nodes, quadrature rule.
 ///
-/// Any combination can be written down; [`validate`](Self::validate) says whether it is an element.
+/// Any combination can be constructed; [`validate`](Self::validate) tells whether it is a valid element.
 ///
 /// # Example
 /// ```
@@ -140,15 +140,18 @@ impl Element {
 
     /// Three-field form, the counterpart of Hu and Washizu's in statics (theory.md (T-3), the paper's (6)).
     ///
-    /// Velocities are unknowns whatever the model was declared by, and no mass matrix is inverted, so that it may be singular where
-    /// constraints hold the motion. With n − 1 Gauss points (the default) it is the mixed form where the Legendre transform exists, with any
-    /// rule the primal form of that rule, because the velocity that it finds is the rate of the coordinates.
+    /// The velocities are unknowns whether the model is declared by a Lagrangian or by a Hamiltonian, and no mass
+    /// matrix is inverted, so that it may be singular where constraints determine the motion. With n − 1 Gauss points
+    /// (the default) the element is equivalent to the mixed form where the Legendre transform exists; with any rule it
+    /// is equivalent to the primal form with that rule, because the velocity that it finds is the rate of the
+    /// coordinates.
     #[must_use]
     pub const fn three_field(nodes: usize) -> Self {
         Self::new(Family::ThreeField, nodes)
     }
 
-    /// Continuous trial, discontinuous test: keeps the energy as far as the rule integrates it.
+    /// Continuous trial and discontinuous test functions: conserves the energy as far as the rule integrates it
+    /// exactly.
     #[must_use]
     pub const fn energy_conserving(nodes: usize) -> Self {
         Self::new(Family::EnergyConserving, nodes)
@@ -172,7 +175,7 @@ impl Element {
         self.with_rule(Rule::Lobatto(self.nodes))
     }
 
-    /// The same with so many Gauss points.
+    /// The same with this number of Gauss points.
     #[must_use]
     pub const fn quadrature(self, points: usize) -> Self {
         self.with_rule(Rule::Gauss(points))
@@ -196,7 +199,7 @@ impl Element {
         self.nodes
     }
 
-    /// The rule as it was asked for.
+    /// The rule as it was requested.
     #[must_use]
     pub const fn rule(&self) -> Rule {
         self.rule
@@ -219,7 +222,7 @@ impl Element {
         }
     }
 
-    /// The number of unknown rates a coordinate: one a point, or n − 1 for a primal element.
+    /// The number of unknown rates for each coordinate: one for each point, or n − 1 for a primal element.
     #[must_use]
     pub const fn unknowns(&self) -> usize {
         if self.family.is_by_displacements() {
@@ -231,7 +234,7 @@ impl Element {
 
     /// Whether the element is a Runge–Kutta method with its points as stages.
     ///
-    /// True for all but primal and three-field elements with another rule than n − 1 Gauss points.
+    /// True for all elements except primal and three-field ones with a rule other than n − 1 Gauss points.
     #[must_use]
     pub const fn is_collocated(&self) -> bool {
         match (self.family, self.rule) {
@@ -241,11 +244,13 @@ impl Element {
         }
     }
 
-    /// Whether the element never lets a linear model with constant coefficients grow that does not grow itself, at any step.
+    /// Whether the element is A-stable: the solution of a linear model with constant coefficients whose exact solution
+    /// does not grow does not grow at any step.
     ///
-    /// Mixed elements and energy-conserving ones integrate such models exactly by every rule that they accept, and are the diagonal Padé
-    /// approximant (T-53) then; reduced primal ones are by definition. Radau's are subdiagonal ones. All map the left half plane of λh into the
-    /// unit disk. What is left are the primal elements with other rules.
+    /// Mixed and energy-conserving elements integrate such models exactly with every rule that they accept, and then
+    /// are the diagonal Padé approximant (T-53); reduced primal elements are so by definition. Radau elements are
+    /// subdiagonal Padé approximants. All of these map the left half plane of λh into the unit disk. Only primal
+    /// elements with other rules do not.
     #[must_use]
     pub const fn is_a_stable(&self) -> bool {
         match (self.family, self.rule) {
@@ -256,7 +261,8 @@ impl Element {
         }
     }
 
-    /// Whether the element can hold constraints (T-75), of positions or of velocities: the multipliers need spaces that fit the trial functions.
+    /// Whether the element can be used with constraints (T-75), of positions or of velocities: the spaces of the
+    /// multipliers have to match the trial functions.
     pub(crate) const fn holds(&self, are_holonomic: bool) -> bool {
         let gauss = match self.rule {
             Rule::Default => matches!(self.family, Family::Mixed | Family::ThreeField),
@@ -270,12 +276,12 @@ impl Element {
         }
     }
 
-    /// Whether a Hamiltonian model runs in phase space; else its velocities are the unknowns.
+    /// Whether a Hamiltonian model is solved in phase space; otherwise its velocities are the unknowns.
     pub(crate) const fn has_phase_form(&self) -> bool {
         self.is_collocated() && !matches!(self.family, Family::ThreeField)
     }
 
-    /// The rule itself.
+    /// The nodes and weights of the rule.
     #[must_use]
     pub const fn quadrature_rule(&self) -> Quadrature {
         match (self.rule, self.family) {
@@ -293,7 +299,7 @@ impl Element {
             Family::Radau => s.saturating_mul(2).saturating_sub(1),
             _ => s.saturating_mul(2),
         };
-        // Order of the rule = degree up to which it is exact, plus one.
+        // Order of the rule = its degree of exactness plus one.
         let rule = match (self.rule, self.family) {
             (Rule::Lobatto(points), _) => points.saturating_mul(2).saturating_sub(2),
             (Rule::Default, Family::Radau) => s.saturating_mul(2).saturating_sub(1),
@@ -305,16 +311,16 @@ impl Element {
     /// Checks the number of nodes and of points.
     ///
     /// # Errors
-    /// [`ElementError::Nodes`] unless 2 ≤ n ≤ 12; [`ElementError::Points`] if the rule has too few
-    /// points to see all unknowns, or more than 32.
+    /// [`ElementError::Nodes`] unless 2 ≤ n ≤ 12; [`ElementError::Points`] if the rule has too few points to determine
+    /// all unknowns, or more than 32.
     pub const fn validate(&self) -> Result<(), ElementError> {
         if self.nodes < Self::MIN_NODES || self.nodes > Self::MAX_NODES {
             return Err(ElementError::Nodes { element: *self });
         }
         let s = self.degree();
         let least = match (self.rule, self.family) {
-            // A Lobatto rule of k points is exact to degree 2k − 3 only: one point more, except
-            // for `Radau`, whose test functions are of one degree less.
+            // A Lobatto rule of k points is exact to degree 2k − 3 only: it needs one point more, except for `Radau`,
+            // whose test functions are of one degree less.
             (Rule::Lobatto(_), Family::Radau) => {
                 if s < 2 {
                     2
@@ -350,20 +356,20 @@ impl fmt::Display for Element {
     }
 }
 
-/// What is wrong with an [`Element`].
+/// Why an [`Element`] is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ElementError {
     /// The number of nodes is not in 2..=12.
     Nodes {
-        /// The element as asked for.
+        /// The element as it was requested.
         element: Element,
     },
     /// The rule has too few points for the spaces, or too many.
     Points {
-        /// The element as asked for.
+        /// The element as it was requested.
         element: Element,
-        /// The fewest points that do.
+        /// The smallest sufficient number of points.
         least: usize,
     },
 }
@@ -389,7 +395,7 @@ impl fmt::Display for ElementError {
 
 impl core::error::Error for ElementError {}
 
-/// One unit struct a family, with the number of nodes in the type: `Mixed::<4>`.
+/// One unit struct for each family, with the number of nodes in the type: `Mixed::<4>`.
 pub mod markers {
     use super::Element;
 
@@ -400,7 +406,7 @@ pub mod markers {
             pub struct $name<const NODES: usize>;
 
             impl<const NODES: usize> $name<NODES> {
-                /// As a value; a number of nodes outside 2..=12 does not compile.
+                /// The element as a value; a number of nodes outside 2..=12 does not compile.
                 #[must_use]
                 pub const fn element(self) -> Element {
                     const {
@@ -424,7 +430,7 @@ pub mod markers {
                     self.element().lobatto()
                 }
 
-                /// The same with so many Gauss points.
+                /// The same with this number of Gauss points.
                 #[must_use]
                 pub const fn quadrature(self, points: usize) -> Element {
                     self.element().quadrature(points)

@@ -1,14 +1,16 @@
-//! Numbers that are known to lie between two bounds: what a kernel gives of such arguments holds for all numbers between them.
+//! Interval arithmetic: an enclosure holds all numbers between two bounds, and the value of a kernel for such arguments
+//! encloses its values for all numbers between them.
 
 use crate::dual::Differentiable;
 use crate::real::{Real, integer_power};
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// All numbers from `low` to `high`, and maybe some more.
+/// An interval: all numbers from `low` to `high`.
 ///
-/// Every operation rounds outwards, so that what it gives of two numbers within its arguments is within its result. Where a function is not defined for some of the
-/// numbers the result is that of the others; where it may be defined for none of them, nothing is known of the result.
+/// Every operation rounds outwards, so that the result for any numbers within the arguments lies within the result.
+/// Where a function is undefined for some of the numbers, the result is that of the others; where it may be undefined
+/// for all of them, the result is [`WHOLE`](Self::WHOLE).
 ///
 /// ```
 /// use tfe_runtime::Real;
@@ -25,14 +27,16 @@ pub struct Enclosure {
     high: f64,
 }
 
-/// Relative to its value, what a sum, a product or a quotient is rounded by is half of this, and what widening by it is rounded by is no more.
+/// The relative amount by which bounds are widened: twice the rounding error of a sum, a product or a quotient, which
+/// also covers the rounding of the widening itself.
 const ROUNDING: f64 = f64::EPSILON;
 
-/// What elementary functions may be wrong by, relative to their values: eight units in the last place, where good libraries promise one to four.
+/// A bound of the relative error of elementary functions: eight units in the last place, where good libraries promise
+/// one to four.
 const ELEMENTARY: f64 = 8.0 * f64::EPSILON;
 
 impl Enclosure {
-    /// Nothing is known.
+    /// All numbers: nothing is known.
     pub const WHOLE: Self = Self {
         low: f64::NEG_INFINITY,
         high: f64::INFINITY,
@@ -44,7 +48,7 @@ impl Enclosure {
         high: 0.0,
     };
 
-    /// All numbers between two; of NaN nothing is known.
+    /// All numbers between two given ones; [`WHOLE`](Self::WHOLE) if one of them is NaN.
     #[must_use]
     pub fn between(a: f64, b: f64) -> Self {
         if a <= b {
@@ -74,13 +78,13 @@ impl Enclosure {
         self.high
     }
 
-    /// How far the bounds are apart; zero where nothing is known.
+    /// The distance between the bounds; zero where nothing is known.
     pub(crate) fn width(self) -> f64 {
         let width = self.high - self.low;
         if width.is_finite() { width } else { 0.0 }
     }
 
-    /// 1 where all numbers are above zero, −1 where all are below, 0 where neither is certain.
+    /// 1 where all numbers are positive, −1 where all are negative, 0 where neither is certain.
     #[must_use]
     pub fn side(self) -> f64 {
         if self.low > 0.0 {
@@ -92,7 +96,7 @@ impl Enclosure {
         }
     }
 
-    /// All numbers of both.
+    /// The smallest enclosure that contains both.
     #[must_use]
     pub fn hull(self, other: Self) -> Self {
         Self {
@@ -105,11 +109,11 @@ impl Enclosure {
         self.low == 0.0 && self.high == 0.0
     }
 
-    /// Computed bounds, moved outwards by what they may be rounded by.
+    /// Computed bounds, moved outwards by their possible rounding error.
     #[inline]
     fn widened(low: f64, high: f64, relative: f64) -> Self {
         let (low, high) = (low - relative * low.abs(), high + relative * high.abs());
-        // Infinities less infinities are NaN: then nothing is known.
+        // The difference of two infinities is NaN: then nothing is known.
         if low <= high {
             Self { low, high }
         } else {
@@ -117,13 +121,13 @@ impl Enclosure {
         }
     }
 
-    /// The same where results below the smallest normal number have lost digits.
+    /// The same, also where results below the smallest normal number have lost digits.
     #[inline]
     fn outward(low: f64, high: f64, relative: f64) -> Self {
         Self::widened(low - f64::MIN_POSITIVE, high + f64::MIN_POSITIVE, relative)
     }
 
-    /// Of four values the least and the largest.
+    /// The interval from the smallest to the largest of four values.
     #[inline]
     fn of_corners([a, b, c, d]: [f64; 4], relative: f64) -> Self {
         if (a + b + c + d).is_nan() {
@@ -134,7 +138,7 @@ impl Enclosure {
         Self::outward(low, high, relative)
     }
 
-    /// A function that rises, with the numbers for which it is defined.
+    /// The image under a monotonically increasing function with this domain.
     fn rising(self, defined: (f64, f64), function: fn(f64) -> f64) -> Self {
         let (low, high) = (self.low.max(defined.0), self.high.min(defined.1));
         if low <= high {
@@ -144,7 +148,7 @@ impl Enclosure {
         }
     }
 
-    /// The first k of those numbers first + k · period that may be within, if there is one.
+    /// The first number of the sequence first + k · period that may be within, if there is one.
     fn first_within(self, first: f64, period: f64) -> Option<f64> {
         const MARGIN: f64 = 1e-9;
         let margin = MARGIN * (1.0 + self.low.abs().max(self.high.abs()));
@@ -153,7 +157,7 @@ impl Enclosure {
         (!(first + period * next > self.high + margin)).then_some(next)
     }
 
-    /// A function that oscillates between −1 and 1, the latter at `top` + 2πk.
+    /// The image under a function that oscillates between −1 and 1 and has its maxima at `top` + 2πk.
     fn wave(self, top: f64, function: fn(f64) -> f64) -> Self {
         if !(self.high - self.low < TAU) {
             return Self::between(-1.0, 1.0);
@@ -162,7 +166,7 @@ impl Enclosure {
         let ends = Self::widened(a.min(b), a.max(b), ELEMENTARY);
         let (mut low, mut high) = (ends.low.max(-1.0), ends.high.min(1.0));
         if let Some(k) = self.first_within(top, PI) {
-            // An extreme, the lower ones at odd k; the other kind may be behind it.
+            // An extremum; the odd k are minima. An extremum of the other kind may follow it.
             let is_lower = (k as i64) % 2 != 0;
             let other = if is_lower { top } else { top + PI };
             let has_other = self.first_within(other, TAU).is_some();
@@ -191,7 +195,7 @@ impl Add for Enclosure {
     type Output = Self;
     #[inline]
     fn add(self, other: Self) -> Self {
-        // What is exact stays so: slopes of constants.
+        // Exact values stay exact, such as the zero slopes of constants.
         if other.is_zero() {
             self
         } else if self.is_zero() {
@@ -273,7 +277,7 @@ impl SubAssign for Enclosure {
 }
 
 impl Real for Enclosure {
-    /// None where it holds for some of the numbers, or may.
+    /// `None` where the comparison holds for some of the numbers only, or may do so.
     type Mask = Option<bool>;
 
     #[inline]
@@ -379,7 +383,7 @@ impl Real for Enclosure {
     }
     fn powi(self, exponent: i32) -> Self {
         if exponent < 0 {
-            // 1/x⁻ⁿ, and what has no opposite overflows anyhow.
+            // 1/x⁻ⁿ; the one exponent that cannot be negated overflows anyhow.
             return Self::from_f64(1.0) / self.powi(exponent.checked_neg().unwrap_or(i32::MAX - 1));
         }
         if exponent == 0 {
@@ -396,7 +400,7 @@ impl Real for Enclosure {
     }
     #[allow(clippy::cast_possible_truncation, reason = "compared with what it was")]
     fn powf(self, exponent: Self) -> Self {
-        // Beyond 32 bits this is no more the same number.
+        // Beyond 32 bits the conversion would change the number.
         let whole = exponent.low as i32;
         if exponent.low == exponent.high && f64::from(whole) == exponent.low {
             return self.powi(whole);
@@ -405,7 +409,7 @@ impl Real for Enclosure {
             low: self.low.max(0.0),
             high: self.high,
         };
-        // Whole numbers among the exponents have powers of what is below zero, too.
+        // With integer exponents, negative bases have powers as well.
         if !(base.low <= base.high) || (self.low < 0.0 && exponent.low < exponent.high) {
             return Self::WHOLE;
         }

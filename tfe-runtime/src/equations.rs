@@ -1,4 +1,4 @@
-//! What both forms of the element equations have in common.
+//! The interface that the velocity form and the phase-space form of the element equations share.
 
 use crate::error::StepError;
 use crate::model::State;
@@ -6,12 +6,13 @@ use crate::statistics::Statistics;
 
 /// The equations of one element for its unknown rates x.
 pub(crate) trait Equations {
-    /// Whether Newton's method alone solves them: where it begins is then a continued polynomial, not one that a fixed point has failed from.
+    /// Whether only Newton's method solves them. It then starts from a continued polynomial, not from the result of a
+    /// failed fixed-point iteration.
     const BY_NEWTON_ALONE: bool = false;
 
-    /// The step of the fixed-point iteration at x, not yet applied: x + `step` is the improvement.
+    /// The increment of the fixed-point iteration at x, which is not applied: the next iterate is x + `step`.
     ///
-    /// With `refresh`, mass matrices are evaluated anew.
+    /// With `refresh`, the mass matrices are evaluated anew.
     fn sweep(&mut self, x: &[f64], step: &mut [f64], refresh: bool) -> Result<(), StepError>;
 
     /// The residual at x.
@@ -25,44 +26,44 @@ pub(crate) trait Equations {
         tangent: &mut [f64],
     ) -> Result<(), StepError>;
 
-    /// How large an increment of x is beside the state.
+    /// The size of an increment of x, relative to the state.
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment;
 
-    /// Brings what the end of the step needs up to the final x, after Newton's method.
+    /// After Newton's method, updates to the final x what the end of the step depends on.
     fn finish(&mut self, x: &[f64], scratch: &mut [f64]) -> Result<(), StepError>;
 
-    /// The counts.
+    /// The counts of evaluations and iterations.
     fn statistics(&mut self) -> &mut Statistics;
 }
 
-/// An increment beside the state: h |δx| over the largest component.
+/// The size of an increment relative to the state: h |δx| divided by the largest component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Increment {
-    /// The larger one of coordinates and momenta.
+    /// The larger of the values for coordinates and for momenta.
     pub(crate) relative: f64,
-    /// Coordinates alone.
+    /// The value for the coordinates alone.
     pub(crate) position: f64,
 }
 
 impl Increment {
-    /// Nothing has changed.
+    /// An increment of zero.
     pub(crate) const NONE: Self = Self {
         relative: 0.0,
         position: 0.0,
     };
 }
 
-/// One element of a step: where it starts, and what hits it.
+/// One element of a step: its start, its length, and the impulses in it.
 #[derive(Clone, Copy)]
 pub(crate) struct Span<'a, const N: usize> {
     pub(crate) t: f64,
     pub(crate) h: f64,
     pub(crate) start: &'a State<N>,
-    /// What the start is more than its rounded numbers.
+    /// The rounding error of the start (compensated summation): the start is the sum of both.
     pub(crate) low: &'a State<N>,
-    /// What impulses add to the rows.
+    /// The contributions of impulses to the rows.
     pub(crate) kicks: &'a [[f64; N]],
-    /// γ of an additional force γ v; zero in steps.
+    /// The factor γ of an additional force γ v; zero in ordinary steps.
     pub(crate) damping: f64,
 }
 
@@ -82,7 +83,7 @@ pub(crate) fn weighted<const N: usize>(high: &[f64], low: &[f64], rows: &[[f64; 
     sum
 }
 
-/// start + (h · rate + low): the small parts meet first.
+/// start + (h · rate + low): the small terms are added first.
 #[inline(always)]
 pub(crate) fn moved<const N: usize>(
     start: &[f64; N],
@@ -97,7 +98,7 @@ pub(crate) fn moved<const N: usize>(
     place
 }
 
-/// The largest |h δ| over the largest of |start| and |h x|; zero over zero is zero, NaN stays NaN.
+/// The largest |h δ| divided by the largest of |start| and |h x|; 0/0 counts as zero, and NaN stays NaN.
 pub(crate) fn relative(h: f64, start: &[f64], x: &[f64], step: &[f64]) -> f64 {
     let mut scale = 0.0_f64;
     for value in start {
@@ -107,7 +108,7 @@ pub(crate) fn relative(h: f64, start: &[f64], x: &[f64], step: &[f64]) -> f64 {
     for (value, step) in x.iter().zip(step) {
         rate = rate.max(value.abs());
         increment = increment.max(step.abs());
-        // Maxima ignore a NaN; the sum does not, and infinities give one.
+        // Maxima ignore a NaN; this sum does not, and turns infinities into one.
         sum += 0.0 * step;
     }
     if sum != 0.0 {

@@ -4,7 +4,7 @@ use crate::element::{Element, ElementError};
 use crate::model::CoordinateName;
 use core::fmt;
 
-/// Why the pointwise change between velocity and momentum failed.
+/// Why the Legendre transform at a point, from velocity to momentum or back, failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LegendreError {
@@ -13,14 +13,14 @@ pub enum LegendreError {
         /// The coordinate at which elimination stopped.
         coordinate: usize,
     },
-    /// Newton's iteration came to no end.
+    /// Newton's iteration did not converge.
     Stalled {
-        /// Iterations done.
+        /// The number of iterations done.
         iterations: u32,
-        /// The largest component that is left of p − L_v (or v − H_p).
+        /// The largest component of the remaining residual p − L_v (or v − H_p).
         residual: f64,
     },
-    /// The model gave a value that is not a number, or the state is none.
+    /// A value of the model, or a component of the state, is not finite.
     NonFinite,
 }
 
@@ -47,44 +47,46 @@ impl fmt::Display for LegendreError {
 
 impl core::error::Error for LegendreError {}
 
-/// What constraints do not allow.
+/// What is wrong with the constraints of a model, or with a state under them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ConstraintError {
-    /// The element has no place for the multipliers of a constraint.
+    /// The element has no multipliers for a constraint of this kind.
     Element {
         /// The element.
         element: Element,
-        /// The first constraint that it cannot hold.
+        /// The first constraint that the element cannot enforce.
         constraint: &'static str,
     },
-    /// The start is not on the constraints.
+    /// The start violates the constraints.
     Start {
-        /// The constraint that is violated most.
+        /// The most violated constraint.
         constraint: CoordinateName,
-        /// Whether positions violate it, or velocities.
+        /// Whether it is violated by the positions; otherwise by the velocities.
         position: bool,
-        /// By how much: |φ| or |A v + a| over the length of its row.
+        /// The size of the violation: |φ| or |A v + a|, divided by the norm of its row.
         residual: f64,
     },
-    /// The rows of the constraints depend on one another, and those that follow from others are violated: they contradict, or a singular position was
-    /// met.
+    /// Some rows of the constraints are linearly dependent, and the redundant constraints are violated: either the
+    /// constraints contradict each other, or the motion has met a singular position.
     Dependent {
-        /// The constraint that is violated.
+        /// The violated constraint.
         constraint: &'static str,
-        /// By how much, as at the start.
+        /// The size of the violation, as in [`ConstraintError::Start`].
         residual: f64,
     },
-    /// The fixed-point iteration does not solve constraints; Newton's method does.
+    /// Equations with constraints cannot be solved by fixed-point iteration; Newton's method can.
     NeedsNewton,
-    /// No velocity belongs to the momentum: the kinetic energy is singular for motions that the constraints allow.
-    SingularMass,
-    /// Rows of constraints follow from others, of a model of run-time length, whose sparse factorisations need all to be independent; or the kinetic energy is singular for motions that they
+    /// No unique velocity belongs to the momentum: the kinetic energy is singular for motions that the constraints
     /// allow.
+    SingularMass,
+    /// Some rows of the constraints of a model of run-time length are linearly dependent, which its sparse
+    /// factorisation does not allow; or the kinetic energy is singular for motions that the constraints allow.
     DependentRows,
-    /// The number of independent constraints is not the same at all nodes.
+    /// The number of independent constraints differs between nodes.
     RankChanged,
-    /// The derivative by a parameter was asked for that the model does not tell: see [`Model::parameters`](crate::Model::parameters).
+    /// A derivative by a parameter was requested that the model does not provide: see
+    /// [`Model::parameters`](crate::Model::parameters).
     Parameter,
 }
 
@@ -140,7 +142,7 @@ impl fmt::Display for ConstraintError {
 
 impl core::error::Error for ConstraintError {}
 
-/// Why a step failed. Where it failed is known to whoever counts the steps.
+/// Why a step failed. The place of the failure is added by the caller that counts the steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum StepError {
@@ -149,57 +151,60 @@ pub enum StepError {
         /// Length of the element.
         step: f64,
     },
-    /// The caller's memory is too small for the element.
+    /// The memory provided by the caller is too small for the element.
     Workspace {
-        /// Numbers that are needed.
+        /// The required length.
         needed: usize,
-        /// Numbers that were given.
+        /// The length provided.
         given: usize,
     },
-    /// A value that is not finite turned up, in the state or in the model.
+    /// A value of the model, or a component of the state, is not finite.
     NonFinite,
-    /// The matrix of Newton's method has no factors.
+    /// The matrix of Newton's method is singular.
     SingularTangent {
         /// The unknown at which elimination stopped.
         unknown: usize,
     },
-    /// Newton's method came to no end.
+    /// Newton's method did not converge.
     NewtonStalled {
-        /// Iterations done.
+        /// The number of iterations done.
         iterations: u32,
         /// The last increment, relative to the state.
         residual: f64,
-        /// What was asked for.
+        /// The requested tolerance.
         tolerance: f64,
     },
-    /// The fixed-point iteration came to no end, and nothing else was allowed.
+    /// The fixed-point iteration did not converge, and Newton's method was not allowed.
     FixedPointStalled {
-        /// Iterations done.
+        /// The number of iterations done.
         iterations: u32,
         /// The last increment, relative to the state.
         residual: f64,
-        /// What was asked for.
+        /// The requested tolerance.
         tolerance: f64,
     },
-    /// The iteration converged, but not by contracting from its first step on: what it found may be another root of the equations of a long step.
+    /// The iteration converged, but did not contract from its first step on: what it found may be another root of the
+    /// equations, as may happen in long steps.
     Unproven {
         /// The largest ratio of an increment to the one before.
         ratio: f64,
     },
-    /// Newton's method converged to an end whose energy is another one, although the model conserves it: the root of another motion, or a step over a singular point.
+    /// Newton's method converged to an end with a different energy, although the model conserves energy: the root
+    /// belongs to another motion, or the step has passed over a singular point.
     EnergyJump {
         /// The energy at the start of the step.
         before: f64,
         /// The energy at its end.
         after: f64,
     },
-    /// The motion comes back at once to a jump of a force that it has crossed: it would slide along it (Filippov), which the equations as declared do not describe.
+    /// After crossing a jump of a force, the motion returns to it at once: it would slide along the jump (Filippov),
+    /// which the equations as declared do not describe.
     Slides,
-    /// The step crosses kinks or jumps of forces more often than it can be cut.
+    /// The step crosses more kinks or jumps of forces than it can be cut at.
     TooManyKinks,
-    /// The change between velocities and momenta failed at a point of the element.
+    /// The Legendre transform failed at a point of the element.
     Legendre(LegendreError),
-    /// Something about the constraints.
+    /// A problem with the constraints.
     Constraint(ConstraintError),
 }
 
@@ -278,7 +283,7 @@ impl fmt::Display for StepError {
 impl core::error::Error for StepError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
-            // Its text is the source's own.
+            // The text is that of the source itself, which is therefore skipped.
             Self::Legendre(source) => source.source(),
             Self::Constraint(source) => source.source(),
             _ => None,
@@ -286,26 +291,27 @@ impl core::error::Error for StepError {
     }
 }
 
-/// Why there is no transition matrix.
+/// Why a transition matrix could not be computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum TransitionError {
-    /// The element is none.
+    /// The element is invalid.
     Element(ElementError),
     /// The step itself failed, or its tangent is singular.
     Step(StepError),
-    /// No step has been done whose matrix could be meant.
+    /// No step has been made whose transition matrix could be computed.
     NoStep,
-    /// An impulse acts inside an element whose start or end moves, as at an event: that it moves in the element is not differentiated.
+    /// An impulse acts inside an element whose start or end moves, for example with an event: the change of its place
+    /// in the element is not differentiated.
     MovedImpulse {
-        /// When it acts.
+        /// The time of the impulse.
         time: f64,
     },
-    /// The result needs more room.
+    /// The memory for the result is too small.
     Shape {
-        /// Numbers that are needed.
+        /// The required length.
         needed: usize,
-        /// Numbers that were given.
+        /// The length provided.
         given: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! What speaks for the solution of an element (T-115, T-117).
+//! Evidence that the solution found for an element is the one that continues the motion (T-115, T-117).
 
 use crate::control::{POSITION_ROUND_OFF, Solve};
 use crate::element::Element;
@@ -7,38 +7,41 @@ use crate::error::StepError;
 use crate::legendre::energy_at;
 use crate::model::{Model, State};
 
-/// Whether what an iteration has found is near where it began: increments that shrink by a factor from the first one on stay in a ball around the start, and the
-/// root in that ball is the only one (T-115). An iteration that wandered before it contracted may have found any root.
+/// Evidence that an iteration has found a root near its start. If the increments shrink by a factor from the first one
+/// on, they stay in a ball around the start, and the root is the only one in that ball (T-115). An iteration that
+/// wandered before it contracted may have found any root.
 pub(crate) struct Evidence {
     /// The largest ratio of an increment to the one before.
     ratio: f64,
     last: f64,
-    /// Increments that tell something.
+    /// The number of increments that were large enough to count.
     count: u32,
-    /// The largest ratio that is a proof.
+    /// The largest ratio that is accepted as a proof.
     limit: f64,
-    /// How large the second increment may be, relative to the state.
+    /// The largest acceptable second increment, relative to the state.
     reach: f64,
 }
 
 impl Evidence {
-    /// The largest ratio that counts as a proof, for Newton's method: half of what the theorem of Newton and Kantorovich allows, because the ratios that are seen are no
-    /// bounds of those that are not.
+    /// The largest ratio that is accepted as a proof for Newton's method: half of what the theorem of Newton and
+    /// Kantorovich allows, because the observed ratios are not bounds of the others.
     const PROVEN: f64 = 0.25;
 
-    /// The same for the fixed point, whose ratios differ less from one another, where Newton's method may follow.
+    /// The same for the fixed-point iteration, whose ratios vary less, in case Newton's method can take over.
     pub(crate) const CONTRACTS: f64 = 0.5;
 
-    /// The same where nothing else is there: by Banach's theorem any contraction will do.
+    /// The same where Newton's method cannot take over: by Banach's theorem any contraction suffices.
     pub(crate) const CONTRACTS_ALONE: f64 = 1.0;
 
-    /// Smaller increments, relative to the state, cannot reach another root.
+    /// Increments below this size, relative to the state, cannot lead to another root.
     pub(crate) const FAR: f64 = 1e-3;
 
-    /// The second increment of Newton's method is what the linear model at the start is wrong by.
+    /// The largest acceptable second increment of Newton's method, which measures the error of the linearisation at the
+    /// start.
     const CURVED: f64 = 0.03;
 
-    /// Of the largest ratio of increments beyond [`FAR`](Self::FAR); `yielding` says that Newton's method may follow.
+    /// From the largest ratio among increments above [`FAR`](Self::FAR); `yielding` tells whether Newton's method can
+    /// take over.
     #[inline(always)]
     pub(crate) fn of_fixed_point(ratio: f64, yielding: bool) -> Self {
         Self {
@@ -62,11 +65,13 @@ impl Evidence {
         }
     }
 
-    /// The next increment; `own` says that its matrix was made in this step. What the matrix of another step does is no evidence.
+    /// Takes the next increment. `own` tells whether its matrix was made in this step: contraction with the matrix of
+    /// another step is no evidence.
     #[inline(always)]
     pub(crate) fn see(&mut self, increment: Increment, own: bool) {
         let size = increment.relative;
-        // Velocities and multipliers of short steps may go to and fro by the roundings of constraints over the step.
+        // In short steps, velocities and multipliers may oscillate by the rounding error of the constraints divided by
+        // the step.
         if size > Self::FAR && increment.position > POSITION_ROUND_OFF {
             let curved = self.count == 1 && size > self.reach;
             let ratio = if curved { 1.0 } else { size / self.last };
@@ -77,8 +82,8 @@ impl Evidence {
     }
 
     /// # Errors
-    /// [`StepError::Unproven`]; [`StepError::EnergyJump`] where the energies of start and end, which the model conserves, are too far apart even for a proven root, and by more than their
-    /// [`rounding`].
+    /// [`StepError::Unproven`]; [`StepError::EnergyJump`] where the energies at start and end, which the model
+    /// conserves, differ by more than even a proven root allows, and by more than their [`rounding`].
     pub(crate) fn check_with(
         &self,
         solve: Solve,
@@ -116,29 +121,31 @@ impl Evidence {
     }
 }
 
-/// The energies at both ends of a step of a model that conserves them.
+/// The energies at both ends of a step, for models that conserve energy.
 #[derive(Clone, Copy)]
 pub(crate) struct Energy {
     before: f64,
     after: f64,
-    /// How much of it is kinetic at the start, or has become so: half of p·v stands for the kinetic energy.
+    /// How much energy is kinetic at the start, or has become so; half of p·v stands for the kinetic energy.
     turned: f64,
     is_forward: bool,
 }
 
-/// Whether energies tell anything of a model: those that conserve them. Constraints are told by their drift.
+/// Whether the energy of a model is conserved, so that it can be checked. Constraints are checked by their drift
+/// instead.
 pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
     !(M::FACTS.time_dependent || M::FACTS.forced)
 }
 
 impl Energy {
-    /// The largest change, relative to what is turned from one kind into the other, of a root that is proven otherwise: steps that are too long, not wrong roots.
+    /// The largest accepted change of energy, relative to the energy converted between kinetic and potential, for a
+    /// root that is otherwise proven: larger changes come from steps that are too long, not from wrong roots.
     const MAX_OF_PROVEN: f64 = 0.5;
 
-    /// The same of other roots.
+    /// The same for other roots.
     const MAX_OF_OTHERS: f64 = 0.1;
 
-    /// Nothing where a state has no velocity, which may yet be right.
+    /// `None` where a state has no velocity, which need not be a mistake.
     pub(crate) fn of<M, const N: usize>(
         model: &M,
         (t, h): (f64, f64),
@@ -175,18 +182,19 @@ impl Energy {
         }
     }
 
-    /// Whether the energy has changed by no more than so much of what was turned, and what is rounded. Elements that damp may lose some.
+    /// Whether the change of the energy is at most the fraction `most` of the converted energy, plus rounding. With
+    /// dissipative elements, any loss is accepted.
     fn is_kept(&self, most: f64, element: Element, rounded: f64) -> bool {
         let change = self.after - self.before;
         let rounding = 1e-9 * self.before.abs().max(self.after.abs());
         let allowed = most * self.turned + rounding + rounded;
         let is_damped = element.family().damps() && self.is_forward;
-        // NaN is not kept.
+        // A NaN does not count as conserved.
         change <= allowed && (is_damped || -change <= allowed)
     }
 }
 
-/// What the energies of both ends may be rounded by; zero where that is not known.
+/// The possible rounding error of both energies; zero where it is unknown.
 #[cold]
 pub(crate) fn rounding<M, const N: usize>(
     model: &M,

@@ -1,4 +1,5 @@
-//! Exponential, logarithm, hyperbolic tangent and power of several numbers at once, without branches: the same digits on every processor.
+//! Exponential, logarithm, hyperbolic tangent and power of several numbers at once, without branches; the digits are
+//! the same on every processor.
 //!
 //! ```text
 //! exp:    x = n ln 2 + r ,  |r| ≤ ½ ln 2 ,      eˣ = 2ⁿ (1 + r + r² Q(r))
@@ -17,16 +18,16 @@
 use crate::real::Real;
 use crate::trigonometry::{Turn, replace_outside, replace_outside_of_two};
 
-/// Between these eˣ is neither infinite nor subnormal.
+/// For |x| up to this limit, eˣ is neither infinite nor subnormal.
 pub(crate) const EXP_LIMIT: f64 = 700.0;
 
-/// The numbers whose logarithm is computed here.
+/// The range of numbers whose logarithm is computed here.
 pub(crate) const LN_LIMITS: (f64, f64) = (f64::MIN_POSITIVE, f64::MAX);
 
-/// Any number that is finite.
+/// Every finite number is within this limit.
 pub(crate) const TANH_LIMIT: f64 = f64::MAX;
 
-/// Adding it rounds to a whole number, which the last bits of the sum then hold.
+/// Adding this constant rounds a number to an integer, which the last bits of the sum then contain.
 const ROUNDER: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
 
 /// The parts of ln 2.
@@ -56,22 +57,23 @@ const LN: [f64; 7] = [
     0.147_981_986_051_165_86,
 ];
 
-/// Numbers whose exponents can be taken and given.
+/// Numbers whose binary exponents can be read and changed.
 pub(crate) trait Scale: Turn {
-    /// x 2ⁿ, n in the last bits of `count`; for results that are normal numbers.
+    /// x 2ⁿ, with n in the last bits of `count`; the result has to be a normal number.
     fn times_power_of_two(self, count: Self) -> Self;
 
-    /// m and k of x = m 2ᵏ, ½√2 ≤ m < √2; of positive normal numbers.
+    /// m and k of x = m 2ᵏ with ½√2 ≤ m < √2, for positive normal x.
     fn parted(self) -> (Self, Self);
 }
 
 /// The bits of ½√2, rounded.
 pub(crate) const HALF_ROOT: u64 = 0x3fe6_a09e_667f_3bcd;
-/// What makes exponents of m zero: the bits of one less those.
+/// The difference between the bits of 1 and of ½√2: added to the bits of a number, it makes the exponent field that of
+/// k.
 pub(crate) const TO_ONE: u64 = 0x3ff0_0000_0000_0000 - HALF_ROOT;
-/// The bits of a number that are not its exponent.
+/// The mantissa bits of a number.
 pub(crate) const FRACTION: u64 = 0x000f_ffff_ffff_ffff;
-/// 2⁵², the last bits of which are those of a whole number added to it, and the bias of exponents.
+/// 2⁵²: the last bits of its sum with an integer are those of the integer. `BIAS` is the bias of exponents.
 pub(crate) const SHIFTED: f64 = 4_503_599_627_370_496.0;
 pub(crate) const BIAS: f64 = 1023.0;
 
@@ -90,7 +92,8 @@ impl Scale for f64 {
     }
 }
 
-/// n in the last bits of a number, r = x − n ln 2 and e^r − 1, for |x| ≤ [`EXP_LIMIT`], of a number and what rounding took from it.
+/// n in the last bits of a number, r = x − n ln 2, and e^r − 1, for |x| ≤ [`EXP_LIMIT`]; `x_low` is the rounding error
+/// of x.
 #[inline(always)]
 fn reduced<R: Scale>(x: R, x_low: Option<R>) -> (R, R) {
     let shifted = x.fused(x.like(core::f64::consts::LOG2_E), x.like(ROUNDER));
@@ -99,7 +102,7 @@ fn reduced<R: Scale>(x: R, x_low: Option<R>) -> (R, R) {
     let part = n * x.like(LN_2_LOW);
     let r = high - part;
     let low = (high - r) - part;
-    // By halves (Estrin), so that no chain of operations is long.
+    // The polynomial is evaluated by Estrin's scheme, so that the chains of dependent operations are short.
     let z = r * r;
     let square = z * z;
     let [first, second, third] = &TAYLOR;
@@ -107,7 +110,7 @@ fn reduced<R: Scale>(x: R, x_low: Option<R>) -> (R, R) {
     let series = square.fused(upper, cubic(r, z, first));
     let mut rest = z.fused(series, low);
     if let Some(x_low) = x_low {
-        // A rounding of 700 is so large that its product with e^r counts.
+        // The rounding error of a number near 700 is so large that its product with e^r counts.
         rest = x_low.fused(x.like(1.0) + (r + rest), rest);
     }
     (shifted, r + rest)
@@ -126,17 +129,17 @@ pub(crate) fn exp_of_small<R: Scale>(x: R) -> R {
     exp_of_two(x, None)
 }
 
-/// The same of a number and what rounding took from it.
+/// The same for a number with its rounding error.
 #[inline(always)]
 fn exp_of_two<R: Scale>(x: R, x_low: Option<R>) -> R {
     let (shifted, less_one) = reduced(x, x_low);
     (x.like(1.0) + less_one).times_power_of_two(shifted)
 }
 
-/// tanh x of finite numbers; the sign of zero is lost.
+/// tanh x of finite numbers; the sign of a zero is lost.
 #[inline(always)]
 pub(crate) fn tanh_of_finite<R: Scale>(x: R) -> R {
-    /// Beyond it the tangent is one.
+    /// Beyond this argument, the hyperbolic tangent rounds to one.
     const FAR: f64 = -80.0;
 
     let (zero, one) = (x.like(0.0), x.like(1.0));
@@ -181,19 +184,19 @@ const ARTANH_END: [f64; 3] = [1.0 / 21.0, 1.0 / 23.0, 1.0 / 25.0];
 const THIRD: f64 = 1.0 / 3.0;
 const THIRD_LOW: f64 = 1.850_371_707_708_594e-17;
 
-/// ln x of positive normal numbers and what rounding takes from it, good to 2⁻⁶⁵ of it.
+/// ln x of positive normal numbers and its rounding error; together they are accurate to 2⁻⁶⁵ of the logarithm.
 #[inline(always)]
 fn ln_in_two<R: Scale>(x: R) -> (R, R) {
     let (part, exponent) = x.parted();
     let two = x.like(2.0);
-    // s = f/(2 + f) in two words
+    // s = f/(2 + f) as a sum of two numbers
     let f = part - x.like(1.0);
     let sum = two + f;
     let sum_low = f - (sum - two);
     let inverse = x.like(1.0) / sum;
     let s = f * inverse;
     let s_low = s.fused(-sum_low, s.fused(-sum, f)) * inverse;
-    // artanh s = s + s (z/3 + z² (1/5 + …)), z = s²: the first term in two words as well.
+    // artanh s = s + s (z/3 + z² (1/5 + …)), z = s²: the first term is a sum of two numbers as well.
     let z = s * s;
     let z_low = (s + s).fused(s_low, s.fused(s, -z));
     let third = x.like(THIRD);
@@ -212,7 +215,7 @@ fn ln_in_two<R: Scale>(x: R) -> (R, R) {
     let product_low = s.fused(series, -product) + s.fused(series_low, s_low * series);
     let high = s + product;
     let low = ((s - high) + product) + (product_low + s_low);
-    // k ln 2, of which the first part is exact and zero, or larger.
+    // k ln 2; its first part is exact, and either zero or the larger one.
     let whole = exponent * x.like(LN_2_HIGH);
     let total = whole + high;
     let moved = total - whole;
@@ -231,7 +234,7 @@ pub(crate) fn power_of_ordinary<R: Scale>(x: R, y: R) -> (R, R) {
     (exp_of_two(exponent, Some(exponent_low)), exponent)
 }
 
-/// A function of W numbers, those outside of the limits left to another.
+/// A function of W numbers; arguments outside the limits are left to another function.
 #[inline(always)]
 fn within<const W: usize>(
     x: &[f64; W],

@@ -1,9 +1,10 @@
-//! Models of run-time length: what a generated family gives the runtime, and how it steps.
+//! Models of run-time length: the traits that generated families implement, and their stepper.
 //!
-//! A family is a model whose number of coordinates is a field of its struct. Its kernels are loops over slices, compiled once for all lengths;
-//! second derivatives are told entry by entry, so that nobody holds a matrix of zeros. [`Stepper`] moves a [`FamilyState`] with all points
-//! of an element four to a register, as the stepper of fixed-size models does, in time and memory linear in the length; with the feature `sparse` it solves
-//! other kinetic energies and constraints with one sparse matrix for the rates at all points.
+//! A family is a model whose number of coordinates is a field of its struct. Its kernels are loops over slices,
+//! compiled once for all lengths; they report second derivatives entry by entry, so that no dense matrix is stored.
+//! [`Stepper`] moves a [`FamilyState`] with four points of an element in each register, as the stepper of fixed-size
+//! models does, in time and memory linear in the length. With the feature `sparse`, models with other kinetic energies
+//! or with constraints are solved by one sparse matrix for the rates at all points.
 
 #[cfg(feature = "sparse")]
 mod backwards;
@@ -72,9 +73,10 @@ use alloc::vec::Vec;
 use inertia::Legendre;
 use model::slope;
 
-/// The state of coordinates and velocities at time `t`.
+/// The state that belongs to coordinates and velocities at time `t`.
 ///
-/// Where there is none the velocities stand for the momenta: a run from there says what [`momenta`] would say.
+/// If no momenta can be found, the velocities are stored in their place: a run from that state reports the error that
+/// [`momenta`] would report.
 pub fn state<M: Model>(model: &M, t: f64, q: Vec<f64>, v: Vec<f64>) -> FamilyState {
     match momenta(model, t, &q, &v) {
         Ok(p) => FamilyState { q, p },
@@ -82,10 +84,10 @@ pub fn state<M: Model>(model: &M, t: f64, q: Vec<f64>, v: Vec<f64>) -> FamilySta
     }
 }
 
-/// The momenta of coordinates and velocities at time `t`.
+/// The momenta that belong to coordinates and velocities at time `t`.
 ///
 /// # Errors
-/// [`ModelError`] where the model does not fit together, a vector has another length, or no momentum belongs to the velocities.
+/// [`ModelError`] if the model is inconsistent, a vector has another length, or no momenta belong to the velocities.
 pub fn momenta<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Result<Vec<f64>, ModelError> {
     model.check()?;
     check_lengths(model, [("q", q.len()), ("v", v.len())])?;
@@ -120,10 +122,12 @@ fn check_lengths<M: Model>(
     }
 }
 
-/// The velocities that constraints leave of a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, [`velocity`].
+/// The velocities that belong to a momentum under constraints: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without
+/// constraints, [`velocity`].
 ///
 /// # Errors
-/// [`ModelError::NoVelocity`] where there are none, [`ModelError::StateLength`], [`ModelError::ConstraintsNotSupported`] without the feature `sparse`.
+/// [`ModelError::NoVelocity`] if none are found, [`ModelError::StateLength`], [`ModelError::ConstraintsNotSupported`]
+/// without the feature `sparse`.
 pub fn allowed_velocity<M: Model>(
     model: &M,
     t: f64,
@@ -142,8 +146,9 @@ pub fn allowed_velocity<M: Model>(
     Err(ModelError::ConstraintsNotSupported)
 }
 
-/// The reactions λ of the constraints at a state with its velocities, one for each row; the forces on the coordinates are Aᵀλ (T-77). None where there are none to be had: rows that depend on
-/// each other, a kinetic energy that is singular for motions that the constraints allow, and always without the feature `sparse`.
+/// The reactions λ of the constraints at a state with its velocities, one for each row; the forces on the coordinates
+/// are Aᵀλ (T-77). `None` where they cannot be computed: where rows are linearly dependent or the kinetic energy is
+/// singular for motions that the constraints allow, and always without the feature `sparse`.
 #[must_use]
 pub fn reactions<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Option<Vec<f64>> {
     #[cfg(feature = "sparse")]
@@ -160,7 +165,7 @@ pub fn reactions<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Option<Ve
 /// The energy H = p·v − L, or H itself, at a state with its velocities.
 ///
 /// # Panics
-/// Where a vector is shorter than the model.
+/// If a vector is shorter than the model.
 #[must_use]
 pub fn energy<M: Model>(model: &M, t: f64, state: &FamilyState, v: &[f64]) -> f64 {
     energy_at(model, t, (&state.q, &state.p), v)
@@ -178,7 +183,7 @@ pub fn energy_at<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v: &[f64
     }
 }
 
-/// What [`energy_at`] may be rounded by, as [`legendre::energy_rounding`](crate::legendre::energy_rounding).
+/// The possible rounding error of [`energy_at`]; see [`legendre::energy_rounding`](crate::legendre::energy_rounding).
 #[cfg(feature = "std")]
 #[must_use]
 #[cold]
@@ -193,10 +198,10 @@ pub fn energy_rounding<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v:
     bounds.width()
 }
 
-/// The largest |φ| and the largest |A v + a| over the constraints; zeros where there are none.
+/// The largest |φ| and the largest |A v + a| over all constraints; zeros if there are none.
 ///
 /// # Panics
-/// Where a vector is shorter than the model.
+/// If a vector is shorter than the model.
 #[must_use]
 pub fn constraint_residual<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> (f64, f64) {
     struct Rates<'a> {
@@ -223,7 +228,7 @@ pub fn constraint_residual<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) ->
 /// One of the observables.
 ///
 /// # Errors
-/// [`ModelError`] where the model does not fit together or a vector has another length.
+/// [`ModelError`] if the model is inconsistent or a vector has another length.
 #[doc(hidden)]
 pub fn observable<M: Model>(
     model: &M,
@@ -236,10 +241,10 @@ pub fn observable<M: Model>(
     Ok(values.first().copied().unwrap_or(f64::NAN))
 }
 
-/// Some observables in a row: `place` says from which one on and how many, once lengths are known to fit.
+/// Several consecutive observables: `place` gives the first one and their number, once lengths are known to agree.
 ///
 /// # Errors
-/// [`ModelError`] where the model does not fit together or a vector has another length.
+/// [`ModelError`] if the model is inconsistent or a vector has another length.
 #[doc(hidden)]
 pub fn observables<M: Model>(
     model: &M,
@@ -260,15 +265,15 @@ pub fn observables<M: Model>(
     Ok(values.into_iter().skip(first).take(count).collect())
 }
 
-/// What generated code checks.
+/// Checks of lengths, indices and ranges, which generated code calls.
 #[doc(hidden)]
 pub mod checks {
     use super::ModelError;
 
-    /// Longer than any array: sums of some such lengths do not overflow.
+    /// Longer than any array, and small enough that sums of several such lengths do not overflow.
     const LONGEST: i64 = 1 << 40;
 
-    /// A length is one that an array may have.
+    /// Checks that an array may have this length.
     ///
     /// # Errors
     /// [`ModelError::Length`].
@@ -279,7 +284,7 @@ pub mod checks {
         Err(ModelError::Length { field, length })
     }
 
-    /// A coordinate array has elements.
+    /// Checks that an array of coordinates is not empty.
     ///
     /// # Errors
     /// [`ModelError::NoElements`].
@@ -290,7 +295,7 @@ pub mod checks {
         Ok(())
     }
 
-    /// A range has turns.
+    /// Checks that a range is not empty.
     ///
     /// # Errors
     /// [`ModelError::EmptyRange`].
@@ -301,7 +306,7 @@ pub mod checks {
         Ok(())
     }
 
-    /// An index stays inside its array.
+    /// Checks that an index is within its array.
     ///
     /// # Errors
     /// [`ModelError::Index`].
@@ -322,7 +327,7 @@ pub mod checks {
         })
     }
 
-    /// An index made of an entry of a list (its name, the list, the place) stays inside its array.
+    /// Checks that an index computed from an entry of a list (its name, the list, the place) is within its array.
     ///
     /// # Errors
     /// [`ModelError::ListEntry`].
@@ -346,13 +351,13 @@ pub mod checks {
         })
     }
 
-    /// An entry of a list as a summand: larger ones than any array is long count as that.
+    /// An entry of a list as a term of an index; entries larger than any length are limited to that.
     #[must_use]
     pub fn small(entry: usize) -> i64 {
         i64::try_from(entry).map_or(LONGEST, |entry| entry.min(LONGEST))
     }
 
-    /// An array field is as long as the largest of its indices asks for: (length, index, ranges) of each.
+    /// Checks that an array field is as long as the largest of its indices requires: (length, index, ranges) of each.
     ///
     /// # Errors
     /// [`ModelError::FieldLength`].

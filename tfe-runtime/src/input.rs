@@ -1,16 +1,16 @@
-//! What may go wrong with functions that are given for inputs.
+//! What can go wrong with the functions that give the inputs of a model.
 
-/// What was wrong with a function that was given for an input.
+/// A function that gives an input has returned a value that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InputFailure {
     /// The input.
     pub input: &'static str,
-    /// The time that the function was asked for.
+    /// The time at which the function was called.
     pub time: f64,
-    /// What it gave.
+    /// The value that it returned.
     pub value: f64,
 }
 
-/// A function that was given for an input has panicked.
+/// A function that gives an input has panicked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputPanicked;

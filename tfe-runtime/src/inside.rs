@@ -1,4 +1,5 @@
-//! The polynomials of an element, differentiated: as linear functions of its start and of directions, and what a loss has of them backwards (T-154).
+//! The derivatives of the polynomial of an element as linear functions of its start and of directions, and the adjoint
+//! of this map: how the derivatives of a loss by the polynomial enter those by rates and forces (T-154).
 //!
 //! With the Legendre coefficients C of dq/dτ and dp/dτ, which are linear in the rates ν and the forces F at the points,
 //!
@@ -18,28 +19,30 @@ use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm, add_row
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The derivatives of the polynomial of an element, or of a piece of one that was cut, with a column for each number of the start, ordered (p, q), and each direction.
+/// The derivatives of the polynomial of an element, or of one piece of an element that was cut. There is a column for
+/// each component of the start, ordered (p, q), and for each direction.
 ///
-/// Times inside move as the ends do: derivatives are those at a fixed part of the piece.
+/// Times inside move with the ends: the derivatives are taken at a fixed fraction of the piece.
 #[derive(Clone, Debug, Default)]
 pub struct InsideSlopes {
-    /// Of the state at the start of the piece, 2N rows, ordered (p, q).
+    /// Derivatives of the state at the start of the piece; 2N rows, ordered (p, q).
     pub start: Vec<f64>,
-    /// Of the Legendre coefficients of dq/dτ, N rows each, then of those of dp/dτ.
+    /// Derivatives of the Legendre coefficients of dq/dτ, N rows for each coefficient, then of those of dp/dτ.
     pub coefficients: Vec<f64>,
 }
 
-/// The derivatives of a loss by the polynomial of an element, or of a piece of one that was cut, of n coordinates.
+/// The derivatives of a loss by the polynomial of an element, or of one piece of an element that was cut, with n
+/// coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InsideLoss {
     /// By the state at the start, ordered (p, q).
     pub start: Vec<f64>,
-    /// By the Legendre coefficients of dq/dτ, a row of n each, then by those of dp/dτ.
+    /// By the Legendre coefficients of dq/dτ, a row of n for each, then by those of dp/dτ.
     pub coefficients: Vec<f64>,
 }
 
 impl InsideLoss {
-    /// Of a loss that has nothing of a polynomial of n coordinates and this degree.
+    /// Zero derivatives, for a polynomial of n coordinates and of this degree.
     #[must_use]
     pub fn none(n: usize, degree: usize) -> Self {
         Self {
@@ -48,7 +51,7 @@ impl InsideLoss {
         }
     }
 
-    /// Adds what it has of the state at τ ∈ [0, 1].
+    /// Adds the derivatives of the loss by the state at τ ∈ [0, 1].
     pub fn add(&mut self, tau: f64, (by_q, by_p): (&[f64], &[f64])) {
         let n = self.start.len() / 2;
         let half = self.coefficients.len() / 2;
@@ -64,7 +67,8 @@ impl InsideLoss {
         }
     }
 
-    /// What it has of the rates at the unknown nodes and of the forces at the points of an element of length h, a row of n each.
+    /// The derivatives of the loss by the unknown rates and by the forces at the points of an element of length h, a
+    /// row of n for each.
     pub(crate) fn seeds(&self, scheme: &SchemeRef<'_>, h: f64) -> Seeds {
         let (q, p) = self.coefficients.split_at(self.coefficients.len() / 2);
         let n = self.start.len() / 2;
@@ -85,27 +89,28 @@ impl InsideLoss {
     }
 }
 
-/// What a loss has of the inside of an element.
+/// The derivatives of a loss by the unknowns inside an element.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Seeds {
-    /// Of the unknown rates, a row of n each; in phase space of the velocities at the stages. Nothing where it has nothing of the inside.
+    /// By the unknown rates, a row of n for each; in phase space by the velocities at the stages. Empty if the loss
+    /// does not depend on the inside.
     pub(crate) rates: Vec<f64>,
-    /// Of the forces at the points, a row of n each.
+    /// By the forces at the points, a row of n for each.
     pub(crate) forces: Vec<f64>,
 }
 
 impl Seeds {
-    /// Those of an element, if there is such a loss.
+    /// The derivatives for an element; empty without a loss.
     pub(crate) fn of(inside: Option<&InsideLoss>, scheme: &SchemeRef<'_>, h: f64) -> Self {
         inside.map_or_else(Self::default, |inside| inside.seeds(scheme, h))
     }
 
-    /// Whether there are none.
+    /// Whether the loss does not depend on the inside.
     pub(crate) fn is_empty(&self) -> bool {
         self.rates.is_empty()
     }
 
-    /// Adds those of the forces at a point.
+    /// Adds the derivatives by the forces at a point.
     #[cfg(feature = "sparse")]
     pub(crate) fn add_forces(&self, point: usize, forces: &mut [f64]) {
         let n = forces.len();
@@ -114,7 +119,8 @@ impl Seeds {
         }
     }
 
-    /// Adds them to λᵀ ∂(end)/∂(interior), and what they have of directions at a fixed interior, in phase space.
+    /// Adds these derivatives to λᵀ ∂(end)/∂(interior), in phase space, and adds their derivatives by the directions at
+    /// a fixed interior.
     pub(crate) fn add_to_phase(
         &self,
         x: &[f64],
@@ -131,7 +137,7 @@ impl Seeds {
         }
     }
 
-    /// The same for velocities, where forces are functions of the interior, of the start and of directions.
+    /// The same in velocity form, where forces are functions of the interior, of the start and of the directions.
     pub(crate) fn add_to_velocities<M: Model<N>, const N: usize>(
         &self,
         equations: &mut VelocityForm<'_, M, N>,
@@ -181,7 +187,7 @@ fn force_by_q<const N: usize>(point: &PointDerivatives<N>) -> [[f64; N]; N] {
     by_q
 }
 
-/// What the columns of an element are, for its polynomials.
+/// The solved right-hand sides of an element, from which the derivatives of its polynomials follow.
 pub(crate) struct Columns<'a, const N: usize> {
     pub(crate) scheme: SchemeRef<'a>,
     pub(crate) h: f64,
@@ -190,7 +196,7 @@ pub(crate) struct Columns<'a, const N: usize> {
     pub(crate) sides: &'a [f64],
 }
 
-/// Σ weight · row, from a first row on, N rows apart, added to N rows.
+/// Adds Σ weight · row to N rows; the terms begin at a first row and are N rows apart.
 fn add_rows<const N: usize>(
     sums: &mut [f64],
     (weights, factor): (&[f64], f64),
@@ -207,7 +213,8 @@ impl<const N: usize> Columns<'_, N> {
         2 * N + self.directions.len()
     }
 
-    /// The solutions with what the length of the element does: h Σ weight · these is the derivative of h Σ weight · unknowns.
+    /// The solutions, corrected for a change of the length of the element: h Σ weight · (these) is the derivative of h
+    /// Σ weight · unknowns.
     fn stretched(&self, x: &[f64]) -> Vec<f64> {
         let (columns, mut sides) = (self.count(), self.sides[..x.len() * self.count()].to_vec());
         for (k, direction) in self.directions.iter().enumerate() {
@@ -220,7 +227,7 @@ impl<const N: usize> Columns<'_, N> {
         sides
     }
 
-    /// The rows of coefficients that are h Σ weight · rows.
+    /// Appends the rows of coefficients h Σ weight · rows.
     fn projected(&self, matrix: &[f64], rows: &[f64], coefficients: &mut Vec<f64>) {
         let columns = self.count();
         let points = rows.len() / (N * columns);
@@ -236,7 +243,7 @@ impl<const N: usize> Columns<'_, N> {
         Vec::with_capacity(2 * self.scheme.rates() * N * self.count())
     }
 
-    /// In phase space.
+    /// The derivatives in phase space.
     pub(crate) fn of_phase(&self, x: &[f64]) -> Vec<f64> {
         let rows = self.stretched(x);
         let (forces, rates) = rows.split_at(rows.len() / 2);
@@ -246,7 +253,7 @@ impl<const N: usize> Columns<'_, N> {
         coefficients
     }
 
-    /// For velocities.
+    /// The derivatives in velocity form.
     pub(crate) fn of_velocities<M: Model<N>>(
         &self,
         equations: &mut VelocityForm<'_, M, N>,
@@ -260,7 +267,8 @@ impl<const N: usize> Columns<'_, N> {
         Ok(coefficients)
     }
 
-    /// With constraints, where the polynomial of the momenta goes through those at the points and at the ends, whose slopes are given.
+    /// The derivatives with constraints, where the polynomial of the momenta passes through those at the points and at
+    /// the ends, whose derivatives are given.
     pub(crate) fn of_constrained<M: Model<N>>(
         &self,
         equations: &mut VelocityForm<'_, M, N>,
@@ -274,7 +282,7 @@ impl<const N: usize> Columns<'_, N> {
         self.projected(self.scheme.rate, &self.stretched(x), &mut coefficients);
         let first = coefficients.len();
         coefficients.resize(2 * first, 0.0);
-        // Linear in momenta: column by column.
+        // The map is linear in the momenta: column by column.
         let none = vec![[0.0; N]; self.scheme.unknowns()];
         let mut of_column = vec![[0.0; N]; self.scheme.points()];
         for column in 0..columns {
@@ -297,7 +305,8 @@ impl<const N: usize> Columns<'_, N> {
         Ok(coefficients)
     }
 
-    /// The slopes of momenta, or of forces with what the length of the element does, at the points: N rows each, with all columns.
+    /// The derivatives of the momenta at the points, or of the forces, corrected for a change of the length of the
+    /// element: N rows for each point, with all columns.
     fn at_points<M: Model<N>>(
         &self,
         equations: &mut VelocityForm<'_, M, N>,
@@ -312,7 +321,7 @@ impl<const N: usize> Columns<'_, N> {
         let mut point = PointDerivatives::ZERO;
         for (l, slopes) in all.chunks_exact_mut(size).enumerate() {
             equations.derivatives(l, rates, &mut point)?;
-            // What the directions move at fixed unknowns is in `along`.
+            // The effect of the directions at fixed unknowns is in `along`.
             let row = l * unknowns..(l + 1) * unknowns;
             by_q.fill(0.0);
             for a in 0..N {
@@ -358,7 +367,7 @@ impl<const N: usize> Columns<'_, N> {
     }
 }
 
-/// Which slopes at points.
+/// Which derivatives at the points are computed.
 #[derive(Clone, Copy, Debug)]
 enum Wanted {
     Momenta,

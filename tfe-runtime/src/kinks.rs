@@ -1,7 +1,8 @@
-//! Steps that are cut where forces have kinks or jumps (T-119).
+//! Event location inside steps: steps are cut where forces have kinks or jumps (T-119).
 //!
-//! `select`, `abs`, `sign`, `min` and `max` choose by the sign of a switching function g(t, q, z). Over an element in which no g changes its sign all is smooth, and the
-//! element has its order; where one does, the step is made of arcs that end at the roots.
+//! `select`, `abs`, `sign`, `min` and `max` choose a branch by the sign of a switching function g(t, q, z). In an
+//! element in which no g changes its sign, the equations are smooth and the element has its full order. Where a g
+//! changes its sign, the step is made of arcs that end at the roots.
 
 mod search;
 mod watched;
@@ -14,63 +15,65 @@ use alloc::vec::Vec;
 use search::{Crossing, begins_on_root, first_crossing};
 pub(crate) use watched::{Log, Watched};
 
-/// All arcs of a step may cost so many trials,
+/// All arcs of a step together may take this many trials,
 const MAX_WORK: usize = 1000;
 
-/// and so many more for every switching function that changes its sign in it.
+/// and this many more for each switching function that changes its sign in the step.
 const WORK_OF_ONE: usize = 16;
 
-/// So many arcs may be short that end where others have: a motion that goes to and fro without end does so faster and faster, while many sites may come to their roots at all but one time.
+/// The largest number of short arcs that may end at roots of the same functions: a motion that chatters does so faster
+/// and faster without end, whereas many sites may reach their roots at almost the same time.
 const MAX_SHORT: u32 = 20;
 
-/// Lengths that are tried for one arc.
+/// The largest number of lengths tried for one arc.
 const MAX_TRIALS: u32 = 100;
 
-/// Arcs shorter than that, relative to the step, have no other roots.
+/// Arcs shorter than this, relative to the step, are assumed to have no further roots.
 const SHORT: f64 = 0.02;
 
-/// An arc shorter than that, relative to the step, only gets to the other side of a root nearby.
+/// An arc shorter than this, relative to the step, only moves the state to the other side of a root nearby.
 const SHORTEST: f64 = 1e-6;
 
-/// What lengths of arcs may be off by, relative to the step: far from zero differences of times are off by more.
+/// The error of lengths of arcs, relative to the step; far from t = 0 differences of times have larger errors.
 const DIGITS: f64 = 1e-12;
 
-/// How far behind an arc its polynomial is taken for the motion, relative to the arc.
+/// How far beyond an arc its polynomial is used, relative to the length of the arc.
 const BEYOND: f64 = 1e-3;
 
-/// What moves over elements and can be looked into.
+/// A stepper whose elements can be evaluated inside.
 pub(crate) trait Kinked:
     Halving<State: Clone, Kicks = Vec<<Self as Halving>::Kick>>
 {
-    /// The inside of a step.
+    /// Dense output of one step.
     type Inside;
 
-    /// The inside of the last step.
+    /// Dense output of the last step.
     fn inside(&self) -> Self::Inside;
 
-    /// The state in a step or a little behind it.
+    /// The state inside a step, or slightly beyond its end.
     fn at(inside: &Self::Inside, tau: f64) -> Self::State;
 
-    /// The next step continues none.
+    /// Makes the next step start without continuing the last polynomial.
     fn forget(&mut self);
 
-    /// Adds the values of all switching functions; false, with nothing added, where there is no velocity to know them by.
+    /// Appends the values of all switching functions; false, with nothing appended, where the velocity that they need
+    /// does not exist.
     fn switches(&mut self, t: f64, state: &Self::State, values: &mut Vec<f64>) -> bool;
 
-    /// Points of an element; whether there are some at its ends.
+    /// The number of points of an element, and whether some of them lie at its ends.
     fn points(&self) -> (usize, bool);
 
-    /// Counts a crossing.
+    /// Counts a crossing of a kink.
     fn crossed(&mut self);
 
-    /// Whether steps that fail are cut, kinks or not.
+    /// Whether steps that fail are cut, whether or not there are kinks.
     fn cuts(&self) -> bool;
 
-    /// Whether whatever an iteration converges to is to be taken.
+    /// With `all`, accept any root to which an iteration converges.
     fn trust(&mut self, all: bool);
 }
 
-/// The values of the switching functions of a model; false, with nothing added, where there is no velocity.
+/// Appends the values of the switching functions of a model; false, with nothing appended, where there is no velocity.
 pub(crate) fn switches<M, const N: usize>(
     model: &M,
     t: f64,
@@ -105,19 +108,19 @@ where
     true
 }
 
-/// What all arcs of a step have cost.
+/// The trials that all arcs of a step have taken.
 #[derive(Default)]
 struct Effort {
     trials: usize,
-    /// Why the first one failed that did.
+    /// Why the first failing arc failed.
     failed: Option<StepError>,
 }
 
-/// How an arc has ended.
+/// How an arc ended.
 enum Arc {
-    /// The whole rest of the step, or as much of it as could be done at once.
+    /// At the end of the step, or as far as the step could be made at once, without a root.
     Smooth { length: f64 },
-    /// At the root of a switching function, or by `margin` before it.
+    /// At a root of a switching function, or `margin` before it.
     Crossing {
         length: f64,
         switch: usize,
@@ -125,10 +128,11 @@ enum Arc {
     },
 }
 
-/// Moves `state` from t to t + h in smooth arcs; the stepper may be left trusting.
+/// Moves `state` from t to t + h in smooth arcs. On return, the stepper may still accept any root (see
+/// [`Kinked::trust`]).
 ///
 /// # Errors
-/// [`StepError`]; `state` is then where the last arc has ended.
+/// [`StepError`]; `state` is then the end of the last arc.
 pub(crate) fn in_arcs<S: Kinked>(
     stepper: &mut S,
     (t, h): (f64, f64),
@@ -136,14 +140,15 @@ pub(crate) fn in_arcs<S: Kinked>(
     kicks: &[S::Kick],
 ) -> Result<(), StepError> {
     let end = t + h;
-    // How much of the step is left, also where roundings of the times are more than its digits.
+    // What remains of the step is kept separately, because far from t = 0 it has more correct digits than differences
+    // of times.
     let (mut now, mut left, mut kicks) = (t, h, kicks.to_vec());
     let (mut begins_at_root, mut short) = (false, 0);
     let (mut effort, mut crossings) = (Effort::default(), 0);
     // The functions that have changed their signs.
     let mut seen: Vec<usize> = Vec::new();
     while effort.trials < MAX_WORK + WORK_OF_ONE * seen.len() {
-        // Friction ends with a velocity of zero, relative to which all increments are large.
+        // Friction ends at velocity zero, relative to which all increments are large.
         stepper.trust(begins_at_root);
         let (from, kicked) = ((now, begins_at_root), &kicks);
         let rest = rest_of(end - now, left, h);
@@ -174,10 +179,10 @@ pub(crate) fn in_arcs<S: Kinked>(
                 return Err(StepError::Slides);
             }
             let over = 2.0 * margin.copysign(h);
-            // What the time does not resolve is no step.
+            // A step that the time cannot resolve is skipped.
             let is_step = margin > 0.0 && now + over != now;
             if is_step && over.abs() < 0.5 * (end - now).abs() {
-                // A step across a jump that has no solution: each side leads back to the other.
+                // A step across a jump may have no solution: each side leads back to the other.
                 let crossed = stepper.whole(now, over, state, &[]);
                 crossed.map_err(|_| StepError::Slides)?;
                 stepper.passed(now, over, Vec::new());
@@ -185,7 +190,7 @@ pub(crate) fn in_arcs<S: Kinked>(
             }
         }
         if is_last {
-            // It was not kinks that made longer arcs fail.
+            // The longer arcs did not fail because of kinks.
             return match effort.failed {
                 Some(error) if crossings == 0 && !stepper.cuts() => Err(error),
                 _ => Ok(()),
@@ -195,7 +200,8 @@ pub(crate) fn in_arcs<S: Kinked>(
     Err(StepError::TooManyKinks)
 }
 
-/// The rest of a step h, of which so much is `left`: the difference `between` the times, where it has the digits of the step.
+/// What remains of a step h after arcs that leave `left` of it: the difference `between` the times, where it has the
+/// digits of the step.
 fn rest_of(between: f64, left: f64, h: f64) -> f64 {
     let is_rounded = (left - between).abs() > DIGITS * h.abs();
     let is_ahead = if h > 0.0 { left > 0.0 } else { left < 0.0 };
@@ -220,12 +226,12 @@ fn is_later<K: Instant>(kick: &K, time: f64, h: f64) -> bool {
 struct Landing {
     length: f64,
     switch: usize,
-    /// How far before it.
+    /// The distance to the root.
     change: f64,
 }
 
 impl Landing {
-    /// Whether what is left is little beside the step.
+    /// Whether that distance is small relative to the step.
     fn is_near(&self, h: f64) -> bool {
         self.change.abs() < SHORTEST * h.abs()
     }
@@ -244,10 +250,11 @@ impl Landing {
     }
 }
 
-/// One arc: to the end, or to the first root of a switching function.
+/// Computes one arc, to the end of the step or to the first root of a switching function.
 ///
-/// Lengths are tried until one ends at a root: each trial that crosses one tells where it is, each that ends before one tells how far it is by the slope there. Where the
-/// iteration of a long arc fails, because forces jump within it, a shorter one is continued to the root.
+/// Lengths are tried until an arc ends at a root. Each trial that crosses a root tells where it is; each trial that
+/// ends before one gives an estimate from the slope there. Where the iteration for a long arc fails, because forces
+/// jump within it, a shorter arc is extended to the root.
 fn arc<S: Kinked>(
     stepper: &mut S,
     (now, begins_at_root): (f64, bool),
@@ -261,7 +268,7 @@ fn arc<S: Kinked>(
     let (points, has_ends) = stepper.points();
     let samples = (2 * points).clamp(8, 24);
     let start = state.clone();
-    // Points at the ends of an element have to be on the side of its inside.
+    // Points at the ends of an element have to lie on the same side of the root as its inside.
     let margin = if has_ends { 4.0 * resolution } else { 0.0 };
     let mut length = rest;
     // The function at whose root the arc is to end, and the last correction of its length.
@@ -269,10 +276,10 @@ fn arc<S: Kinked>(
     let mut last_change = f64::INFINITY;
     // The longest arc without a root, and the shortest one that failed.
     let (mut good, mut bad) = (0.0_f64, f64::INFINITY);
-    // What came next to a root without crossing it; to be taken when nothing else comes nearer.
+    // The arc that came nearest to a root without crossing it; it is used if none comes nearer.
     let mut nearest: Option<Landing> = None;
     let mut is_to_settle = false;
-    // A length that is to be taken without a search.
+    // A length that is accepted without a search.
     let mut only = None;
     for trial in 0..MAX_TRIALS {
         effort.trials += 1;
@@ -321,7 +328,7 @@ fn arc<S: Kinked>(
             let here = S::at(&inside, tau);
             stepper.switches(now + tau * signed, &here, row);
         };
-        // A root at the end of a step that has a point there: on which side is a matter of rounding.
+        // A root at the end of a step that has a point there: on which side it lies is decided by rounding.
         let beyond = if has_ends && length == rest {
             resolution / length
         } else {
@@ -353,7 +360,7 @@ fn arc<S: Kinked>(
                 let Some(Crossing { switch, tau }) = ahead.flatten() else {
                     let is_first = trial == 0 && !begins_at_root && length == rest;
                     if is_first && has_ends && begins_on_root(resolution / length, &mut values) {
-                        // The point at the start may be on the other side.
+                        // The point at the start may lie on the other side.
                         length = margin;
                         only = Some(margin);
                         continue;
@@ -366,10 +373,10 @@ fn arc<S: Kinked>(
         };
         let Some(switch) = target else { continue };
         if found.is_none() && change < -4.0 * resolution {
-            // It went away from the root again.
+            // The motion has turned away from the root again.
             return Ok(Arc::Smooth { length: signed });
         }
-        // What is left of it then is the rounding of the function.
+        // The rest is then the rounding error of the function.
         let is_settled =
             change.abs() <= resolution || trial > 4 && change.abs() >= 0.5 * last_change;
         let here = Landing {
@@ -398,14 +405,14 @@ fn arc<S: Kinked>(
         length = if wanted >= bad {
             good + 0.5 * (bad - good)
         } else if wanted >= rest {
-            // Not in this step.
+            // The root is not in this step.
             target = None;
             rest
         } else {
             wanted.max(resolution)
         };
     }
-    // No worse than any other step across a kink.
+    // The result is no worse than any other step across a kink.
     *state = start;
     stepper.forget();
     stepper.whole(now, rest.copysign(h), state, kicks)?;
@@ -414,9 +421,11 @@ fn arc<S: Kinked>(
     })
 }
 
-/// Whether the motion comes back at once to where it has crossed (Filippov): behind the surface the function falls.
+/// Whether the motion returns at once to the surface that it has crossed (Filippov): beyond the surface, the function
+/// decreases again.
 ///
-/// The polynomial of the arc goes on behind the surface by some part of the arc; a much smaller step from there tells where the motion goes on that side.
+/// The polynomial of the arc is extended beyond the surface by a small part of the arc; a much smaller step from there
+/// tells how the motion continues on that side.
 fn slides<S: Kinked>(
     stepper: &mut S,
     (time, length): (f64, f64),
@@ -441,12 +450,12 @@ fn slides<S: Kinked>(
     let moved = stepper.whole(time + ahead, short, &mut behind, &[]).is_ok();
     let second = value(stepper, time + ahead + short, &behind);
     stepper.forget();
-    // Slopes of the function before and behind the surface.
+    // The slopes of the function before and beyond the surface.
     let (arriving, leaving) = (first - before, (second - first) / BEYOND);
     moved && leaving * arriving < -BEYOND * arriving * arriving
 }
 
-/// Whether a shorter arc may go well.
+/// Whether a shorter arc may succeed.
 fn is_of_the_iteration(error: &StepError) -> bool {
     matches!(
         error,

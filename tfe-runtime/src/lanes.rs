@@ -1,4 +1,4 @@
-//! Numbers that kernels compute with: single ones, and several side by side.
+//! The scalars of kernels: single numbers, and several numbers side by side.
 
 use crate::real::{Real, integer_power};
 use crate::trigonometry;
@@ -7,8 +7,10 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// W numbers side by side: one kernel evaluates W instants, or W trajectories, at once.
 ///
-/// The loops over lanes are plain, so that the compiler turns them into vector instructions. So are the elementary functions below, which give the same digits on every processor; the others
-/// are those of the system, one lane after the other. In units in the last place, judged in double-double arithmetic, they are off by less than
+/// The loops over lanes are plain, so that the compiler turns them into vector instructions. The elementary functions
+/// listed below are written in the same way and give the same digits on every processor; all others are those of the
+/// system, called for one lane after the other. Their errors, measured against double-double arithmetic in units in the
+/// last place, are less than
 ///
 /// | `exp`, `ln` | `powf` | `sin`, `cos`, `atan`, `atan2` | `sin_cos` | `tanh` |
 /// |---|---|---|---|---|
@@ -135,7 +137,7 @@ macro_rules! elementary {
     };
 }
 
-/// Sine and cosine alone: half the price of both.
+/// A sine or a cosine alone, at half the cost of both.
 macro_rules! scalar_sines {
     ($scalar:ident, $sin:path, $cos:path) => {
         #[inline]
@@ -163,7 +165,7 @@ macro_rules! scalar_sines {
     };
 }
 
-/// An elementary function of lanes, one lane after the other.
+/// An elementary function of the system, called for one lane after the other.
 macro_rules! lane_function {
     ($name:ident $($argument:ident)*) => {
         #[inline]
@@ -177,7 +179,7 @@ macro_rules! lane_function {
     };
 }
 
-/// What needs no library: the same text for `f64` and `f32`.
+/// The operations that need no library: the same text for `f64` and `f32`.
 macro_rules! scalar_items {
     ($scalar:ident) => {
         type Mask = bool;
@@ -249,7 +251,7 @@ macro_rules! scalar_items {
     };
 }
 
-/// What lanes do beside the elementary functions.
+/// The operations of lanes other than elementary functions.
 macro_rules! lane_items {
     () => {
         type Mask = [bool; W];

@@ -1,4 +1,4 @@
-//! The pointwise Legendre transform: any model seen as a Lagrangian or as a Hamiltonian.
+//! The pointwise Legendre transform: any model can be evaluated as a Lagrangian or as a Hamiltonian.
 //!
 //! From L(q, v, t), with v the solution of p = L_v:
 //!
@@ -7,8 +7,8 @@
 //! H_qq = −L_qq + L_qv L_vv⁻¹ L_vq ,  Q_p = Q_v H_pp ,  Q_q|p = Q_q|v + Q_v H_pq .
 //! ```
 //!
-//! The way back is the same formula with the letters exchanged, because the transform is its own
-//! inverse. Nothing is inverted symbolically; the mass matrix is factored where it is needed.
+//! The inverse transform has the same formula with the letters exchanged, because the transform is its own inverse.
+//! Nothing is inverted symbolically; the mass matrix is factored where it is needed.
 
 #[cfg(feature = "std")]
 use crate::enclosure::Enclosure;
@@ -42,7 +42,7 @@ pub struct HamiltonianView<const N: usize> {
     pub second: Second<f64, N>,
 }
 
-/// The state (q, p) that belongs to coordinates and velocities.
+/// The state (q, p) that belongs to given coordinates and velocities.
 ///
 /// # Errors
 /// [`LegendreError`] if the model is a Hamiltonian and no momentum is found.
@@ -80,7 +80,7 @@ where
     }
 }
 
-/// The velocity v = H_p. For a Lagrangian it is searched from `guess`, such as the last one known.
+/// The velocity v = H_p. For a Lagrangian it is found by Newton's method from `guess`, such as the last known velocity.
 ///
 /// # Errors
 /// [`LegendreError`] if the model is a Lagrangian and no velocity is found.
@@ -100,7 +100,7 @@ where
     }
 }
 
-/// The energy H(q, p, t) where the velocity is known already; NaN if that is NaN and needed.
+/// The energy H(q, p, t), with the velocity given; NaN if the velocity is needed and NaN.
 pub fn energy_at<M, const N: usize>(
     model: &M,
     t: f64,
@@ -117,7 +117,8 @@ where
     }
 }
 
-/// What [`energy_at`] may be rounded by, where it is a difference of nearly equal numbers, as 1 − cos q near zero: the width of the bounds of that function at (q, p). Zero where nothing is known.
+/// A bound of the rounding error of [`energy_at`] where it is a difference of nearly equal numbers, as 1 − cos q is
+/// near zero: the width of the enclosure of that function at (q, p). Zero where nothing is known.
 #[cfg(feature = "std")]
 #[cold]
 pub fn energy_rounding<M, const N: usize>(
@@ -177,7 +178,7 @@ where
     lagrangian_view_from(model, t, q, v, &[0.0; N])
 }
 
-/// The same, searching the momentum from `guess`.
+/// The same, with an initial guess of the momentum.
 pub(crate) fn lagrangian_view_from<M, const N: usize>(
     model: &M,
     t: f64,
@@ -294,7 +295,7 @@ fn transform<const N: usize>(
     Ok((conjugate_first, conjugate))
 }
 
-/// ∂/∂z of the declared function.
+/// The derivative by z of the function by which the model is declared.
 fn derivative<M, const N: usize>(model: &M, t: f64, q: &[f64; N], z: &[f64; N]) -> [f64; N]
 where
     M: Model<N>,
@@ -304,7 +305,8 @@ where
     first.z
 }
 
-/// The z with ∂/∂z = `target`: the momentum of a velocity, or the velocity of a momentum.
+/// The z for which ∂/∂z equals `target`: the momentum that belongs to a velocity, or the velocity that belongs to a
+/// momentum.
 #[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
 pub(crate) fn conjugate<M, const N: usize>(
     model: &M,
@@ -330,8 +332,8 @@ where
         if !residual.is_finite() {
             return Err(LegendreError::NonFinite);
         }
-        // A regular problem leaves the rounding of ∂/∂z; it is reached once the residual is small
-        // beside its terms and no longer falls.
+        // The residual of a regular problem cannot be smaller than the rounding error of ∂/∂z; this limit is reached
+        // once the residual is small relative to its terms and no longer decreases.
         let scale = largest(&first.z).max(largest(target));
         if residual == 0.0 || (residual >= 0.5 * last && residual <= 64.0 * f64::EPSILON * scale) {
             return Ok(z);
@@ -342,8 +344,7 @@ where
         })?;
         let start = z;
         advance(&mut z, &start, &step, 1.0);
-        // A quadratic function is done after one step; a second one takes away the rounding of a
-        // long first one.
+        // For a quadratic function one iteration suffices; a second one removes the rounding error of a long first one.
         let enough = match (M::FACTS.quadratic_in_z, iteration) {
             (true, 0) => 1e-6,
             (true, _) => f64::INFINITY,
@@ -352,7 +353,7 @@ where
         if largest(&step) <= enough * largest(&z) {
             return finite(z);
         }
-        // Damping, for functions like −m√(1 − v²) that end where Newton's step may land.
+        // Damped Newton steps, for functions such as −m√(1 − v²) that are undefined where a full step may lead.
         let mut fraction = 1.0;
         while !M::FACTS.quadratic_in_z
             && residual > 1e-8 * scale
@@ -369,7 +370,8 @@ where
     })
 }
 
-/// The solution of matrix · x = vector, in its place. The matrix of many coordinates is mostly diagonal, and a division for each then does for N³/3 operations.
+/// Solves matrix · x = vector in place. With many coordinates the matrix is mostly diagonal, and then one division for
+/// each replaces N³/3 operations.
 fn solve<const N: usize>(matrix: &[[f64; N]; N], vector: &mut [f64; N]) -> Result<(), Singular> {
     if !is_diagonal(matrix) {
         Block::of(matrix)?.solve(vector);
@@ -388,7 +390,7 @@ fn solve<const N: usize>(matrix: &[[f64; N]; N], vector: &mut [f64; N]) -> Resul
 fn is_diagonal<const N: usize>(matrix: &[[f64; N]; N]) -> bool {
     for a in 0..N {
         for b in 0..N {
-            // A NaN is no zero.
+            // A NaN counts as non-zero.
             if a != b && matrix[a][b] != 0.0 {
                 return false;
             }
@@ -403,7 +405,7 @@ fn advance<const N: usize>(z: &mut [f64; N], start: &[f64; N], step: &[f64; N], 
     }
 }
 
-/// Less, and a number.
+/// Whether `new` is less than `old`, and not NaN.
 fn improves(new: f64, old: f64) -> bool {
     new < old
 }
@@ -420,7 +422,7 @@ fn distance<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {
     largest(&difference)
 }
 
-/// The largest magnitude; NaN if one is.
+/// The largest magnitude; NaN if one of the numbers is NaN.
 pub(crate) fn largest(values: &[f64]) -> f64 {
     let mut largest = 0.0_f64;
     for value in values {

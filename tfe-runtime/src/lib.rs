@@ -1,14 +1,13 @@
-//! The small runtime that generated kernels link into: time elements, Newton, stepping.
+//! The small runtime that generated kernels link into: finite elements in time, Newton's method, time stepping.
 //!
-//! Every element is data. Trial degree, test degree, boundary jumps and rule become a few matrices
-//! ([`scheme`]); a [`Model`] declared by its Lagrangian is solved for velocities, one declared by its
-//! Hamiltonian for rates in phase space. [`step::Stepper`] moves a [`State`] over one element after
-//! the other; [`step::Method`] does the same on the caller's memory, without allocation.
+//! Every element is described by data: trial degree, test degree, boundary jumps and quadrature rule become a few
+//! matrices ([`scheme`]). A [`Model`] declared by its Lagrangian is solved for velocities, one declared by its
+//! Hamiltonian for rates in phase space. [`step::Stepper`] moves a [`State`] over one element after the other;
+//! [`step::Method`] does the same on memory provided by the caller, without allocation.
 //!
 //! # Features
-//! `std` (default): elementary functions of the standard library instead of `libm`; `alloc`: elements
-//! chosen at run time, dense output, the nodal forms of [`weak_form`]. Without both the crate is
-//! `no_std` and does not allocate.
+//! `std` (default): elementary functions of the standard library instead of `libm`; `alloc`: elements chosen at run
+//! time, dense output, the nodal forms of [`weak_form`]. Without both the crate is `no_std` and does not allocate.
 #![cfg_attr(not(feature = "std"), no_std)]
 
 #[cfg(feature = "alloc")]
@@ -108,7 +107,7 @@ pub use share::Share;
 pub use statistics::{Choice, Contraction, Statistics};
 pub use structure::{Operations, Structure};
 
-/// What generated code refers to. Not part of the public interface.
+/// Items that generated code refers to. Not part of the public interface.
 #[doc(hidden)]
 pub mod __private {
     pub use crate::controlled::{Controlled, MAX_INPUTS};
@@ -153,8 +152,8 @@ pub mod __private {
         crate::family::state(model, t, q.as_ref().to_vec(), v.as_ref().to_vec())
     }
 
-    /// The state of coordinates and velocities; a momentum that does not exist is NaN, which the
-    /// first step refuses.
+    /// The state that belongs to coordinates and velocities. A momentum that does not exist becomes NaN, which the
+    /// first step reports.
     pub fn state<M, const N: usize>(model: &M, t: f64, q: [f64; N], v: [f64; N]) -> State<N>
     where
         M: Model<N>,

@@ -1,6 +1,7 @@
-//! Dense LU factorisation with partial pivoting, on the caller's memory.
+//! Dense LU factorisation with partial pivoting, on memory provided by the caller.
 //!
-//! Matrices are flat, row by row. Sizes are small (rates times coordinates): the loops are plain, and of larger ones in the widest registers that the processor has, with the same roundings.
+//! Matrices are flat, row by row. Sizes are small (rates times coordinates). Small matrices are treated by plain loops,
+//! larger ones in the widest registers of the processor, with the same roundings.
 
 mod substitution;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -8,11 +9,11 @@ mod wide;
 
 use substitution::LARGE;
 
-/// Matrices of fewer rows are factored before wide registers pay.
+/// Below this number of rows, wide registers are not worth using.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 const WIDE: usize = 24;
 
-/// A pivot vanished, or was not a number.
+/// A pivot is zero or not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular {
     /// The column at which elimination stopped.
@@ -30,7 +31,7 @@ pub fn factor(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(
     if size >= WIDE
         && let Some(isa) = pulp::x86::V3::try_new()
     {
-        // What lies behind the matrix is no row of it.
+        // Entries of the slice beyond the matrix are left unchanged.
         let matrix = &mut matrix[..size * size];
         return wide::factor(isa, size, matrix, pivots).map_err(|column| Singular { column });
     }
@@ -79,7 +80,7 @@ pub fn solve(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64])
     for k in 0..size {
         vector.swap(k, pivots[k]);
     }
-    // Small programs have one text for all sizes.
+    // Programs without an allocator are to be small: one code for all sizes.
     if size >= LARGE || cfg!(not(feature = "alloc")) {
         return solve_large(size, factors, vector);
     }
@@ -125,7 +126,7 @@ fn transposed(size: usize, factors: &[f64], vector: &mut [f64]) {
     substitution::solve_transposed(size, factors, vector);
 }
 
-/// Solves A X = B in place with the factors of A, `columns` right sides at once, B row by row.
+/// Solves A X = B in place with the factors of A: `columns` right-hand sides at once, B row by row.
 pub(crate) fn solve_columns(factors: &[f64], pivots: &[usize], columns: usize, sides: &mut [f64]) {
     let size = pivots.len();
     for (k, &pivot) in pivots.iter().enumerate() {
@@ -144,13 +145,13 @@ pub(crate) fn solve_columns(factors: &[f64], pivots: &[usize], columns: usize, s
     substitution::solve_columns(size, factors, columns, sides);
 }
 
-/// Factors an N × N block; one that is singular up to rounding counts as singular.
+/// Factors an N × N block; a matrix that is singular up to rounding is reported as singular.
 #[inline]
 pub(crate) fn factor_block<const N: usize>(
     matrix: &mut [f64],
     pivots: &mut [usize],
 ) -> Result<(), Singular> {
-    // Columns carry the units of their coordinate: a pivot is small only beside its column.
+    // Each column has the unit of its coordinate: a pivot is small only relative to its column.
     let mut scales = [0.0_f64; N];
     for row in matrix.chunks_exact(N) {
         for (scale, entry) in scales.iter_mut().zip(row) {
@@ -168,8 +169,10 @@ pub(crate) fn factor_block<const N: usize>(
     Ok(())
 }
 
-/// Whether a pivot is no more than so small a part of what was subtracted on the way to it, Σ |L_ck U_kc|: rows carry units, too, as those of a mass matrix do, and a pivot that is small beside
-/// its column may have all digits. The units of rows and columns multiply both alike.
+/// Whether a pivot has lost its digits by cancellation: whether it is at most the fraction `part` of the terms
+/// subtracted from it, Σ |L_ck U_kc|. A comparison with its column alone would not do, because the rows of a mass
+/// matrix have units as well, and a pivot that is small relative to its column may have all its digits. The units of
+/// rows and columns scale both sides of this test equally.
 #[cold]
 #[inline(never)]
 pub(crate) fn is_lost(size: usize, factors: &[f64], column: usize, part: f64) -> bool {
@@ -177,11 +180,11 @@ pub(crate) fn is_lost(size: usize, factors: &[f64], column: usize, part: f64) ->
     for k in 0..column {
         subtracted += (factors[column * size + k] * factors[k * size + column]).abs();
     }
-    // NaN is lost.
+    // A NaN counts as lost.
     !(factors[column * size + column].abs() > part * subtracted)
 }
 
-/// The factors of a mass matrix, or of another N × N block.
+/// The LU factors of a mass matrix, or of another N × N block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Block<const N: usize> {
     factors: [[f64; N]; N],
@@ -189,7 +192,7 @@ pub(crate) struct Block<const N: usize> {
 }
 
 impl<const N: usize> Block<N> {
-    /// Factors a matrix; one that is singular up to rounding counts as singular.
+    /// Factors a matrix; one that is singular up to rounding is reported as singular.
     #[inline]
     pub(crate) fn of(matrix: &[[f64; N]; N]) -> Result<Self, Singular> {
         let mut block = Self {
@@ -205,7 +208,7 @@ impl<const N: usize> Block<N> {
         solve(N, self.factors.as_flattened(), &self.pivots, vector);
     }
 
-    /// The inverse, for matrices that enter formulas as a whole.
+    /// The inverse, for formulas that need all of its entries.
     #[inline]
     pub(crate) fn inverse(&self) -> [[f64; N]; N] {
         let mut inverse = [[0.0; N]; N];

@@ -1,4 +1,5 @@
-//! What a step is made of: intervals with impulses, the memory from step to step, a model with the tables of its element; starts of iterations and ends of elements.
+//! The parts of a step: intervals with impulses, the memory carried from step to step, the model with the tables of its
+//! element, initial guesses of the iteration, and the end of an element.
 
 use crate::basis::{MAX_NODES, legendre};
 use crate::constrained::rows::Independence;
@@ -13,40 +14,41 @@ use crate::quadrature::MAX_POINTS;
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 
-/// A generalized force of the given time integral that acts at one instant.
+/// An impulse: a generalized force of given time integral that acts at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impulse<const N: usize> {
-    /// When it acts; a time outside the element counts as its nearer end.
+    /// The time at which it acts; a time outside the element is moved to its nearer end.
     pub time: f64,
-    /// ∫ Q dt, one entry a coordinate.
+    /// ∫ Q dt, one entry for each coordinate.
     pub value: [f64; N],
 }
 
 impl<const N: usize> Impulse<N> {
-    /// What it adds to the momenta in an element of length `h`: back in time, h < 0, it is taken away.
+    /// What it adds to the momenta in an element of length `h`; backwards in time, h < 0, it is subtracted.
     pub(crate) fn along(&self, h: f64) -> [f64; N] {
         self.value.map(|value| h.signum() * value)
     }
 }
 
-/// Where an element lies in time, and the impulses that act in it.
+/// The position of an element in time, and the impulses that act in it.
 #[derive(Clone, Copy, Debug)]
 pub struct Interval<'a, const N: usize> {
     /// Time at the start.
     pub start: f64,
-    /// Length h; negative to go back in time.
+    /// Length h; negative to go backwards in time.
     pub length: f64,
-    /// Impulses inside, each weighted by the test functions (T-49); taken away where the element goes back in time.
+    /// The impulses inside, each weighted by the test functions (T-49); subtracted where the element goes backwards in
+    /// time.
     pub impulses: &'a [Impulse<N>],
 }
 
 impl<const N: usize> Interval<'_, N> {
-    /// Where in the element an impulse acts, τ ∈ [0, 1].
+    /// The place τ ∈ [0, 1] in the element at which an impulse acts.
     pub(crate) fn place(&self, impulse: &Impulse<N>) -> f64 {
         ((impulse.time - self.start) / self.length).clamp(0.0, 1.0)
     }
 
-    /// The same, and exactly 0 or 1 where only roundings of the times are between it and an end.
+    /// The same, but exactly 0 or 1 if the impulse differs from a node only by rounding of the times.
     #[cfg(feature = "alloc")]
     pub(crate) fn node_or_place(&self, impulse: &Impulse<N>) -> f64 {
         let (end, tau) = (self.start + self.length, self.place(impulse));
@@ -62,24 +64,25 @@ impl<const N: usize> Interval<'_, N> {
     }
 }
 
-/// What is carried from step to step beside the [`Workspace`](crate::workspace::Workspace).
+/// What is carried from step to step in addition to the [`Workspace`](crate::workspace::Workspace).
 #[derive(Clone, Debug)]
 pub struct Memory<const N: usize> {
     pub(crate) statistics: Statistics,
     /// Start and end of the last step; `None` before the first and after a failure.
     pub(crate) last: Option<Last<N>>,
-    /// What the end is more than its rounded numbers.
+    /// The rounding error of the end of the last step (compensated summation).
     pub(crate) low: State<N>,
     pub(crate) mass: Option<Block<N>>,
-    /// The step for which the workspace holds factors.
+    /// The length of the step whose LU factors the workspace holds.
     pub(crate) factored: Option<f64>,
-    /// The ratio of steps for which it holds the extrapolation.
+    /// The ratio of step lengths for which the workspace holds the extrapolation matrix.
     pub(crate) ratio: Option<f64>,
-    /// Which iteration a nonlinear step begins with.
+    /// The iteration with which a nonlinear step begins.
     pub(crate) preference: Preference,
-    /// Of the rows of constraints at the start and at the end of the last step.
+    /// The independence of the rows of constraints at the start and at the end of the last step.
     pub(crate) independence: Option<[Independence; 2]>,
-    /// The workspace holds where the next step is to start from, beside the velocity at the end of the last one.
+    /// Whether the workspace already holds the initial guess of the next step, in addition to the velocity at the end
+    /// of the last one.
     pub(crate) is_foreseen: bool,
 }
 
@@ -94,7 +97,7 @@ pub(crate) struct Last<const N: usize> {
 }
 
 impl<const N: usize> Last<N> {
-    /// To be filled.
+    /// A placeholder, to be filled.
     pub(crate) const NONE: Self = Self {
         t: 0.0,
         h: 0.0,
@@ -110,7 +113,7 @@ impl<const N: usize> State<N> {
         p: [0.0; N],
     };
 
-    /// Whether all numbers are equal, without a branch for each.
+    /// Whether all numbers are equal, without a branch for each of them.
     pub(crate) fn is_same(&self, other: &Self) -> bool {
         let mut same = true;
         for a in 0..N {
@@ -121,7 +124,7 @@ impl<const N: usize> State<N> {
 }
 
 impl<const N: usize> Memory<N> {
-    /// Nothing is known yet.
+    /// Memory before the first step.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -137,23 +140,23 @@ impl<const N: usize> Memory<N> {
         }
     }
 
-    /// What the steps so far have cost.
+    /// The cost of all steps so far.
     #[must_use]
     pub const fn statistics(&self) -> &Statistics {
         &self.statistics
     }
 
-    /// Whether the last step has ended in `state`.
+    /// Whether the last step ended at `state`.
     pub(crate) fn has_reached(&self, state: &State<N>) -> bool {
         self.last.is_some_and(|last| last.end.is_same(state))
     }
 
-    /// Says that the workspace no longer holds factors.
+    /// Declares that the workspace no longer holds LU factors.
     pub(crate) fn forget_factors(&mut self) {
         self.factored = None;
     }
 
-    /// Says that the workspace is another one: what is known of its factors and of its extrapolation is not known of that.
+    /// Declares that the workspace has been replaced, so that its factors and extrapolation matrix are unknown.
     #[cfg(feature = "alloc")]
     pub(crate) fn forget_workspace(&mut self) {
         (self.factored, self.ratio) = (None, None);
@@ -168,7 +171,8 @@ impl<const N: usize> Default for Memory<N> {
 
 /// A model with the tables of an element: everything about a step that does not change.
 ///
-/// For steps without allocation: [`Memory`] and [`Workspace`](crate::workspace::Workspace) are the caller's. A `Stepper` owns them.
+/// This is for stepping without allocation: [`Memory`] and [`Workspace`](crate::workspace::Workspace) belong to the
+/// caller, whereas a `Stepper` owns them.
 #[derive(Debug)]
 pub struct Method<'a, M, T> {
     /// The model.
@@ -179,7 +183,7 @@ pub struct Method<'a, M, T> {
     pub control: Control,
 }
 
-// Not derived: model and tables are borrowed, they need not be `Clone`.
+// Not derived: model and tables are borrowed and need not be `Clone`.
 impl<M, T> Clone for Method<'_, M, T> {
     fn clone(&self) -> Self {
         *self
@@ -188,7 +192,7 @@ impl<M, T> Clone for Method<'_, M, T> {
 
 impl<M, T> Copy for Method<'_, M, T> {}
 
-/// Whether the equations are those of phase space, given an element that has them.
+/// Whether the equations are those of phase space, for elements that have a phase-space form.
 pub(crate) const fn may_be_phase<M, const N: usize>() -> bool
 where
     M: Model<N>,
@@ -196,7 +200,7 @@ where
     matches!(M::FORM, Form::Hamiltonian) && M::CONSTRAINTS.is_empty()
 }
 
-/// ω_i(τ*) J for every row, −ω_i(τ*) J back in time.
+/// Writes ω_i(τ*) J for every row; −ω_i(τ*) J backwards in time.
 pub(crate) fn set_kicks<const N: usize>(
     scheme: &SchemeRef<'_>,
     interval: &Interval<'_, N>,
@@ -226,7 +230,8 @@ pub(crate) fn total<const N: usize>(impulses: &[Impulse<N>], h: f64) -> [f64; N]
     sum
 }
 
-/// The ratio of steps by which the polynomial of the last element is continued: far outside of it that says nothing, and its end is; backwards it may be reused.
+/// The ratio of step lengths by which the polynomial of the last element is extrapolated. Far outside its element the
+/// polynomial is useless, and its end value is used; backwards in time it may be reused.
 pub(crate) fn continued_ratio(ratio: f64) -> f64 {
     if (-1.5..=3.0).contains(&ratio) {
         ratio
@@ -235,13 +240,14 @@ pub(crate) fn continued_ratio(ratio: f64) -> f64 {
     }
 }
 
-/// Old unknown rates to new ones: the polynomial of the last element, continued (T-65).
+/// The matrix from the old unknown rates to the new ones: extrapolation of the polynomial of the last element (T-65).
 pub(crate) const fn set_extrapolation(scheme: &SchemeRef<'_>, ratio: f64, matrix: &mut [f64]) {
     let degrees = scheme.element.degree();
     extrapolate(scheme.unknown_nodes, (scheme.rate, degrees), ratio, matrix);
 }
 
-/// The same of numbers at the points. Where these are more than s, forces are known by one degree more than rates of the coordinates.
+/// The same for values at the points. Where there are more than s points, the polynomial of the forces has one degree
+/// more than that of the rates of the coordinates.
 pub(crate) const fn set_extrapolation_at_points(
     scheme: &SchemeRef<'_>,
     ratio: f64,
@@ -278,7 +284,8 @@ const fn legendre_of(degree: usize, tau: f64) -> f64 {
     values[degree]
 }
 
-/// Numbers at the places of one element to those at the places of the next, by a matrix that turns them into so many Legendre coefficients.
+/// The matrix from values at the places of one element to those at the places of the next, by way of the given number
+/// of Legendre coefficients.
 const fn extrapolate(
     places: &[f64],
     (coefficients, degrees): (&[f64], usize),
@@ -304,7 +311,7 @@ const fn extrapolate(
     }
 }
 
-/// Constant velocity; zero where the momentum belongs to none.
+/// A constant velocity as initial guess; zero where no velocity belongs to the momentum.
 pub(crate) fn cold_velocity<M, const N: usize>(
     model: &M,
     t: f64,
@@ -317,7 +324,7 @@ pub(crate) fn cold_velocity<M, const N: usize>(
     unknowns.as_chunks_mut::<N>().0.fill(v);
 }
 
-/// The velocity at the start; zero if there is none, which the iteration then finds out.
+/// The velocity at the start; zero if there is none, which the iteration then reports.
 pub(crate) fn cold_rate<M, const N: usize>(model: &M, t: f64, state: &State<N>) -> [f64; N]
 where
     M: Model<N>,
@@ -325,7 +332,7 @@ where
     velocity(model, t, &state.q, &state.p, &[0.0; N]).unwrap_or([0.0; N])
 }
 
-/// The rates at the start.
+/// The rates of phase space at the start, as initial guess.
 pub(crate) fn cold_phase<M, const N: usize>(
     model: &M,
     scheme: &SchemeRef<'_>,
@@ -361,7 +368,7 @@ where
     (first.force, first.z)
 }
 
-/// The end of an element and what rounding took from it (T-68).
+/// The end of an element, and its rounding error (T-68).
 pub(crate) fn end_of<const N: usize>(
     scheme: &SchemeRef<'_>,
     span: &Span<'_, N>,
@@ -369,7 +376,8 @@ pub(crate) fn end_of<const N: usize>(
     forces: &[[f64; N]],
     impulses: &[Impulse<N>],
 ) -> (State<N>, State<N>) {
-    // To more than the working precision: weights and step are the same numbers in every step, and what their products lose is no chance.
+    // In more than working precision: weights and step are the same numbers in every step, so that the rounding errors
+    // of their products are systematic.
     let h = DoubleDouble::new(span.h);
     let (mut end, mut low) = (State::ZERO, State::ZERO);
     for a in 0..N {
@@ -410,7 +418,7 @@ fn integral<const N: usize>(
     sum
 }
 
-/// a + b, rounded, and what rounding took.
+/// a + b, rounded, and its rounding error.
 #[cfg(feature = "alloc")]
 pub(crate) fn sum(a: f64, b: f64) -> (f64, f64) {
     let high = a + b;

@@ -1,4 +1,4 @@
-//! What a generated model gives the runtime.
+//! The interface between a generated model and the runtime.
 //!
 //! A model is declared by its Lagrangian L(q, v, t) or by its Hamiltonian H(q, p, t). The generated
 //! kernels evaluate that function and its partial derivatives at one instant; everything else
@@ -90,27 +90,28 @@ pub enum Form {
     Hamiltonian,
 }
 
-/// What the macro found out about a model; the runtime takes shorter ways where it may.
+/// Structural facts about a model that the macro has determined; they allow the runtime cheaper algorithms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facts {
     /// The time appears in the energy function or in a force.
     pub time_dependent: bool,
     /// There are generalized forces or dissipation.
     pub forced: bool,
-    /// The second derivative by z does not depend on z: one Newton step solves the Legendre transform.
+    /// The second derivative by z does not depend on z: one Newton iteration solves the Legendre transform.
     pub quadratic_in_z: bool,
     /// The second derivative by z is constant (over one run).
     pub constant_mass: bool,
-    /// All second derivatives and all derivatives of forces are constant or depend on the time alone.
+    /// All second derivatives, and all derivatives of forces, are constant or depend on the time only: the equations of
+    /// motion are linear.
     pub linear: bool,
     /// The mixed second derivatives ∂²/∂z∂q vanish.
     pub separable: bool,
-    /// Nothing is chosen by a sign: no `select`, `abs`, `sign`, `min` or `max`.
+    /// The energy function and the forces have no branches: no `select`, `abs`, `sign`, `min` or `max`.
     pub smooth: bool,
 }
 
 impl Facts {
-    /// Nothing is known: every way that holds in general is taken.
+    /// Nothing is known: only algorithms that hold in general are used.
     pub const UNKNOWN: Self = Self {
         time_dependent: true,
         forced: true,
@@ -134,27 +135,28 @@ pub struct Constraint {
 /// What kind of equation a constraint is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConstraintKind {
-    /// φ(q, t) = 0: positions are constrained, and with them velocities, A = φ_q, a = φ_t.
+    /// φ(q, t) = 0: a constraint on positions, and thereby on velocities, with A = φ_q and a = φ_t.
     Holonomic {
         /// φ is a polynomial of at most second degree in the coordinates.
         quadratic: bool,
     },
-    /// A(q, t) v + a(q, t) = 0: velocities alone are constrained.
+    /// A(q, t) v + a(q, t) = 0: a constraint on velocities only.
     Velocity {
-        /// It is the time derivative of some φ(q, t): the macro found ∂A_i/∂q_j = ∂A_j/∂q_i and ∂A_i/∂t = ∂a/∂q_i.
+        /// Whether it is the time derivative of some φ(q, t): whether the macro has found ∂A_i/∂q_j = ∂A_j/∂q_i and
+        /// ∂A_i/∂t = ∂a/∂q_i.
         integrable: bool,
     },
 }
 
 impl ConstraintKind {
-    /// Whether positions are constrained.
+    /// Whether it constrains positions.
     #[must_use]
     pub const fn is_holonomic(self) -> bool {
         matches!(self, Self::Holonomic { .. })
     }
 }
 
-/// The constraints differentiated once more, with one multiplier μ for each; ψ = A v + a.
+/// The derivatives of the constraints that the tangent needs, with a multiplier μ for each constraint; ψ = A v + a.
 ///
 /// Rows have the order of [`Model::CONSTRAINTS`].
 #[derive(Debug)]
@@ -173,25 +175,25 @@ pub struct ConstraintSecond<'a, R, const N: usize> {
 
 /// The kernels of one model with N coordinates.
 ///
-/// Implemented by `#[dynamics]`; by hand where one wants to.
+/// Implemented by `#[dynamics]`, or by hand.
 ///
-/// Every method evaluates at one instant, for one `R`: a number, or lanes of them. `first`,
-/// `first_and_mass` and `second` write only entries that can be non-zero and never read what they
-/// are given, so pass [`First::ZERO`]-like values: entries that are structurally zero stay as they
-/// were.
+/// Every method evaluates at one instant, for one `R`: a number, or several numbers in lanes. `first`, `first_and_mass`
+/// and `second` write only entries that can be non-zero, and never read what is in the output. So pass [`First::ZERO`]
+/// or the like: structurally zero entries keep the value that they had.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a model of fixed size",
     label = "not a model of fixed size",
     note = "models are structs with `#[dynamics(...)]`; what those with `coordinates(q[n])` have is listed in `docs/calls.md`, all else needs a length known here, such as `q[10]`"
 )]
 pub trait Model<const N: usize> {
-    /// By which function it was declared.
+    /// The function by which it was declared.
     const FORM: Form;
     /// What is known about its structure.
     const FACTS: Facts;
 
-    /// The ignorable coordinates: nothing that [`first`](Self::first) and [`first_and_mass`](Self::first_and_mass) give depends on them, and no force acts on them, so that their
-    /// momenta are constant. Steppers leave them out of the iteration of an element (T-162 of `docs/theory.md`). It is no error to name none.
+    /// The ignorable coordinates: no result of [`first`](Self::first) and [`first_and_mass`](Self::first_and_mass)
+    /// depends on them, and no force acts on them, so that their momenta are constant. Steppers leave them out of the
+    /// iteration of an element (T-162 of `docs/theory.md`). It is always correct to name none.
     const IGNORABLE: [bool; N] = [false; N];
 
     /// L(q, v, t), or H(q, p, t).
@@ -210,18 +212,19 @@ pub trait Model<const N: usize> {
         zz: &mut [[R; N]; N],
     );
 
-    /// Whether [`first_inline`](Self::first_inline) and [`first_and_mass_inline`](Self::first_and_mass_inline) are there for themselves, so that
-    /// a stepper may evaluate them at several points at once in the widest registers of the processor.
+    /// Whether [`first_inline`](Self::first_inline) and [`first_and_mass_inline`](Self::first_and_mass_inline) are
+    /// implemented, so that a stepper may evaluate them at several points at once in the widest registers of the
+    /// processor.
     const LANES: bool = false;
 
-    /// The same as [`first`](Self::first), written into the place of its call: only there is it compiled for the instruction set of
-    /// that place.
+    /// The same as [`first`](Self::first), inlined into its caller, so that it is compiled for the instruction set of
+    /// the caller.
     #[inline(always)]
     fn first_inline<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
         self.first(t, q, z, first);
     }
 
-    /// The same as [`first_and_mass`](Self::first_and_mass), written into the place of its call.
+    /// The same as [`first_and_mass`](Self::first_and_mass), inlined into its caller.
     #[inline(always)]
     fn first_and_mass_inline<R: Real>(
         &self,
@@ -247,13 +250,13 @@ pub trait Model<const N: usize> {
     /// The names of the parameters by which the model can be differentiated: those of `sensitivity(…)`.
     const SENSITIVITIES: &'static [&'static str] = &[];
 
-    /// The value of the parameter `SENSITIVITIES[index]`; NaN beyond them.
+    /// The value of the parameter `SENSITIVITIES[index]`; NaN for larger indices.
     fn sensitivity_parameter(&self, _index: usize) -> f64 {
         f64::NAN
     }
 
-    /// The partial derivatives of everything that [`first`](Self::first) gives by a parameter or by the time: ∂L_z/∂a, ∂L_q/∂a, ∂Q/∂a
-    /// (or of H) at fixed (q, z).
+    /// The partial derivatives of all results of [`first`](Self::first) by a parameter or by the time: ∂L_z/∂a,
+    /// ∂L_q/∂a, ∂Q/∂a (or the same of H) at fixed (q, z).
     ///
     /// Called only for the parameters of [`SENSITIVITIES`](Self::SENSITIVITIES), and, where there is at least one, for [`By::Time`].
     fn first_by<R: Real>(
@@ -266,18 +269,23 @@ pub trait Model<const N: usize> {
     ) {
     }
 
-    /// Whether the kernels ask the same functions for what is not a parameter as those of another model of the type do: runs of both may go side by side. Models whose inputs are given
-    /// ([`Controlled`](crate::Controlled)) may differ in them.
+    /// Whether the kernels of this model and of another one of the same type use the same functions for their inputs,
+    /// so that runs of both may be made side by side. Only models with given inputs ([`Controlled`](crate::Controlled))
+    /// can differ in them.
     fn shares_inputs(&self, _other: &Self) -> bool {
         true
     }
 
-    /// What kernels read beside the [parameters](Self::parameters), to the bit and in the order of the struct: fields that are lengths, and the elements of vectors of numbers, with how many there are.
-    /// Models that differ in it do not go side by side, and none goes on where one was suspended that differs in it. Nothing for models of hand-written kernels that do not say.
+    /// Passes to `values` the bits of everything that kernels read besides the [parameters](Self::parameters), in the
+    /// order of the struct: fields that are lengths, and the elements of vectors of numbers, with their number. Models
+    /// that differ in these values cannot be stepped side by side, nor can a suspended run be resumed with a model that
+    /// differs in them. Models with hand-written kernels need not pass anything.
     fn unnumbered<F: FnMut(u64)>(&self, _values: &mut F) {}
 
-    /// The number of parameters: fields that are numbers, and the elements of fields that are arrays of numbers, in the order of the struct. Zero for models of hand-written
-    /// kernels that do not say. Kernels of those that do make each parameter by [`Real::parameter`], so that numbers may carry derivatives by it, or the values of other models.
+    /// The number of parameters: fields that are numbers, and the elements of fields that are arrays of numbers, in the
+    /// order of the struct. Zero for models with hand-written kernels that do not implement it. Kernels of models that
+    /// do make each parameter by [`Real::parameter`], so that it may carry a derivative, or the values of several
+    /// models.
     fn parameters(&self) -> usize {
         0
     }
@@ -287,12 +295,13 @@ pub trait Model<const N: usize> {
         CoordinateName::element("", index)
     }
 
-    /// The value of a parameter; NaN beyond them.
+    /// The value of a parameter; NaN for an index without parameter.
     fn parameter(&self, _index: usize) -> f64 {
         f64::NAN
     }
 
-    /// The same model with another value of one parameter; none where a field of some other type cannot be copied, and beyond the parameters.
+    /// The same model with another value of one parameter; `None` if a field of some other type cannot be copied, and
+    /// for an index without parameter.
     fn with_parameter(&self, _index: usize, _value: f64) -> Option<Self>
     where
         Self: Sized,
@@ -300,10 +309,11 @@ pub trait Model<const N: usize> {
         None
     }
 
-    /// What `f` gives, in which the model is evaluated. Models that ask functions given at run time for their inputs catch panics of these; all others do nothing else.
+    /// Calls `f`, in which the model is evaluated, and returns its result. Models that call user functions for their
+    /// inputs catch panics of these; all others only call `f`.
     ///
     /// # Errors
-    /// [`InputPanicked`]; what `f` was working on is to be left alone then.
+    /// [`InputPanicked`]; what `f` was working on must not be used then.
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked>
     where
         Self: Sized,
@@ -311,7 +321,7 @@ pub trait Model<const N: usize> {
         Ok(f())
     }
 
-    /// The last number of a function given for an input that was not finite, which is forgotten then.
+    /// The last value of an input function that was not finite; the call also clears it.
     fn failed_input(&self) -> Option<InputFailure> {
         None
     }
@@ -324,15 +334,16 @@ pub trait Model<const N: usize> {
     /// The constraints, in order.
     const CONSTRAINTS: &'static [Constraint] = &[];
 
-    /// φ of every holonomic constraint, by its position in [`CONSTRAINTS`](Self::CONSTRAINTS); entries of others stay as they are.
+    /// φ of every holonomic constraint, at its index in [`CONSTRAINTS`](Self::CONSTRAINTS); entries of others are left
+    /// unchanged.
     fn constraint_values<R: Real>(&self, _t: R, _q: &[R; N], _values: &mut [R]) {}
 
-    /// A and a of every constraint; for holonomic ones φ_q and φ_t. Writes only entries that can be non-zero.
+    /// A and a of every constraint; φ_q and φ_t for holonomic ones. Writes only entries that can be non-zero.
     fn constraint_rows<R: Real>(&self, _t: R, _q: &[R; N], _rows: &mut [[R; N]], _drift: &mut [R]) {
     }
 
-    /// The derivatives of the constraints that tangents need, at (t, q, v) and for the multipliers μ. Writes only entries that can be
-    /// non-zero.
+    /// The derivatives of the constraints that the tangent needs, at (t, q, v) and for the multipliers μ. Writes only
+    /// entries that can be non-zero.
     fn constraint_second<R: Real>(
         &self,
         _t: R,
@@ -349,7 +360,8 @@ pub trait Model<const N: usize> {
     /// The names of the observables as declared.
     const OBSERVABLES: &'static [&'static str] = &[];
 
-    /// The number of observables: one for each name. More or others where a model is made of another one at run time.
+    /// The number of observables: one for each name. Models made from another model at run time may have a different
+    /// number.
     fn columns(&self) -> usize {
         Self::OBSERVABLES.len()
     }
@@ -366,10 +378,11 @@ pub trait Model<const N: usize> {
     fn observables<R: Real>(&self, _t: R, _q: &[R; N], _z: &[R; N], _values: &mut [R]) {}
 }
 
-/// When kernels are asked for what no time changes, as a constant mass matrix, or the places of second derivatives: at a time that is none, for which functions given for inputs are not asked.
+/// The time at which kernels are called for what does not depend on the time, such as a constant mass matrix or the
+/// sparsity pattern. It is NaN, for which input functions are not called.
 pub(crate) const NO_TIME: f64 = f64::NAN;
 
-/// By what the first derivatives of a model are differentiated once more.
+/// The variable by which the first derivatives of a model are differentiated once more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {
     /// The time t, at fixed (q, z).
@@ -378,7 +391,7 @@ pub enum By {
     Parameter(usize),
 }
 
-/// The name of a coordinate, `theta1` or `q[3]`, or in models of run-time length of a constraint, `rod[3]`.
+/// The name of a coordinate, `theta1` or `q[3]`; in models of run-time length also of a constraint, `rod[3]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CoordinateName {
     /// The name as declared.
@@ -388,7 +401,7 @@ pub struct CoordinateName {
 }
 
 impl CoordinateName {
-    /// A coordinate of its own.
+    /// A scalar coordinate.
     #[must_use]
     pub const fn single(name: &'static str) -> Self {
         Self { name, index: None }
@@ -403,7 +416,7 @@ impl CoordinateName {
         }
     }
 
-    /// Whether it is printed like this.
+    /// Whether it is printed as this text.
     #[must_use]
     pub fn is(&self, text: &str) -> bool {
         struct Rest<'a>(&'a str);

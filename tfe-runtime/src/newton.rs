@@ -1,4 +1,4 @@
-//! The iterations inside an element: fixed point first, Newton where it must.
+//! The nonlinear iterations of an element: fixed-point iteration first, simplified Newton iteration where it is needed.
 
 use crate::control::POSITION_ROUND_OFF;
 use crate::equations::{Equations, Increment};
@@ -11,7 +11,7 @@ use crate::workspace::Scratch;
 
 pub use crate::control::{Control, Solve};
 
-/// What is asked of an iteration, known when the program runs or when it is compiled.
+/// The settings of an iteration, known at run time or at compile time.
 pub(crate) trait Asked {
     fn control(&self) -> Control;
 }
@@ -23,7 +23,7 @@ impl Asked for Control {
     }
 }
 
-/// [`Control::default`], known to the compiler.
+/// [`Control::default`] as compile-time constants.
 pub(crate) struct Standard;
 
 impl Asked for Standard {
@@ -33,28 +33,28 @@ impl Asked for Standard {
     }
 }
 
-/// Increments below it are the rounding of the residual, if they no longer fall.
+/// Increments below this size are rounding errors of the residual, if they no longer decrease.
 pub(crate) const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
 
-/// The same where Newton's method is ill-conditioned, if they have not fallen for some time.
+/// The same for ill-conditioned Newton matrices, if the increments have not decreased for some time.
 pub(crate) const ROUGH_ROUND_OFF: f64 = 1e-10;
 
-/// The same of large stiff models, where residuals are differences of forces many orders larger.
+/// The same for large stiff models, whose residuals are differences of forces that are many orders of magnitude larger.
 #[cfg(feature = "sparse")]
 const STIFF_ROUND_OFF: f64 = 1e-6;
 
-/// Fixed-point iterations that cost as much as Newton's way.
+/// The number of fixed-point iterations that cost as much as Newton's method.
 pub(crate) const PATIENCE: u32 = 24;
 
-/// Which iteration a step begins with.
+/// The iteration with which a step begins.
 ///
-/// Stiff steps come in rows: after a fixed point that did not contract Newton's method stays chosen for some steps, so that not each of them
-/// pays for two iterations.
+/// Stiff steps come in sequences: after a fixed-point iteration that did not contract, Newton's method stays chosen for
+/// some steps, so that not each of them pays for both iterations.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Preference {
-    /// Steps for which Newton's method stays chosen.
+    /// The number of steps for which Newton's method stays chosen.
     newton_steps: u32,
-    /// How many it will be after the next failure of the fixed point.
+    /// What that number will be after the next failure of the fixed-point iteration.
     penalty: u32,
 }
 
@@ -64,65 +64,68 @@ impl Preference {
         penalty: 0,
     };
 
-    /// Whether a step is to begin with the fixed point.
+    /// Whether a step is to begin with the fixed-point iteration.
     pub(crate) fn is_fixed_point(self) -> bool {
         self.newton_steps == 0
     }
 
-    /// The fixed point was given up.
+    /// Called when the fixed-point iteration is given up.
     pub(crate) fn leave_fixed_point(&mut self) {
         self.penalty = (self.penalty * 2).clamp(1, 1024);
         self.newton_steps = self.penalty;
     }
 
-    /// The fixed point has done a step.
+    /// Called when the fixed-point iteration has solved a step.
     pub(crate) fn confirm_fixed_point(&mut self) {
         self.penalty /= 2;
     }
 
-    /// Newton's method begins a step.
+    /// Called when Newton's method begins a step.
     pub(crate) fn count_newton(&mut self) {
         self.newton_steps = self.newton_steps.saturating_sub(1);
     }
 }
 
-/// Factors of a large sparse matrix serve while increments shrink at least as fast.
+/// LU factors of a large sparse matrix are kept while increments shrink at least by this factor.
 #[cfg(feature = "sparse")]
 pub(crate) const SERVES: f64 = 0.3;
 
-/// Unknowns of an element up to which factors of its matrix are not worth keeping.
+/// Up to this number of unknowns, it is not worth keeping the LU factors of an element.
 const SMALL: usize = 8;
 
-/// Unknowns of an element from which on factors of its matrix are worth keeping for slower contraction.
+/// From this number of unknowns on, LU factors are worth keeping even at slower contraction.
 const LARGE: usize = 24;
 
-/// Judges a sequence of increments.
+/// Monitors the convergence of a sequence of increments.
 pub(crate) struct Monitor {
     tolerance: f64,
-    /// How much the rate before counts.
+    /// The weight of the previous rate.
     memory: f64,
     last: f64,
-    /// By how much it moves the coordinates.
+    /// The last increment of the coordinates alone.
     position: f64,
     rate: f64,
-    /// The largest rate of increments that tell something of the root.
+    /// The largest rate among increments that are large enough to be evidence about the root.
     wildest: f64,
     risen: u32,
-    /// Increments in a row that a fresh matrix did not make smaller.
+    /// The number of successive increments that a newly factored matrix did not make smaller.
     #[cfg(feature = "sparse")]
     noise: u32,
-    /// The smallest increment so far, and for how many iterations it has not been halved.
+    /// The smallest increment so far; `idle` counts the iterations since it was last halved.
     best: f64,
     idle: u32,
 }
 
-/// One lucky small increment must not end an iteration: it goes on as if the rate before counted that much.
+/// One accidentally small increment must not end an iteration: the convergence estimate uses at least this fraction of
+/// the previous rate.
 const MEMORY: f64 = 0.1;
 
-/// What a fixed point has to come to, and how much the rate before counts, for a tolerance.
+/// The target of a fixed-point iteration for a tolerance, and the weight of the previous rate.
 ///
-/// Above the roundings both are strict: momenta at the end follow from forces at the rates before the last increment, which are off by more than the rates after it.
-/// By increments alone some are left off by 170 times the tolerance, with a 16th of it by five times, with a 64th by half of it (`a_tolerance_is_what_an_element_leaves`).
+/// Above round-off both are strict, because the momenta at the end follow from forces at the rates before the last
+/// increment, whose error is larger than that of the rates after it. Judged by increments alone, some results are off
+/// by 170 times the tolerance; with a 16th of it as target, by five times; with a 64th, by half of it
+/// (`a_tolerance_is_what_an_element_leaves`).
 pub(crate) fn of_fixed_point(tolerance: f64) -> (f64, f64) {
     if tolerance > Control::DEFAULT.tolerance {
         (tolerance / 64.0, 1.0)
@@ -136,10 +139,12 @@ pub(crate) enum Verdict {
     GoOn,
 }
 
-/// So many iterations without a smaller increment are noise, if the coordinates do not move any more.
+/// After this many iterations without a smaller increment, increments are rounding errors, if the coordinates no longer
+/// change.
 pub(crate) const IDLE: u32 = 6;
 
-/// So many iterations without a smaller increment are a cycle: a contraction by 0.999 halves increments in fewer.
+/// After this many iterations without a smaller increment, the iteration is a cycle: even a contraction by 0.999 halves
+/// increments in fewer.
 pub(crate) const MAX_IDLE: u32 = 1000;
 
 impl Monitor {
@@ -159,7 +164,7 @@ impl Monitor {
         }
     }
 
-    /// For a fixed point.
+    /// The monitor of a fixed-point iteration.
     #[inline(always)]
     pub(crate) fn of_fixed_point(tolerance: f64) -> Self {
         let (tolerance, memory) = of_fixed_point(tolerance);
@@ -169,18 +174,19 @@ impl Monitor {
         }
     }
 
-    /// By how much the last increment was smaller than the one before.
+    /// The ratio of the last increment to the one before.
     pub(crate) fn rate(&self) -> f64 {
         self.rate
     }
 
-    /// What speaks for the root that a fixed point has found; `yielding` says that Newton's method may follow.
+    /// The evidence for the root that a fixed-point iteration has found; `yielding` tells whether Newton's method can
+    /// take over.
     #[inline(always)]
     pub(crate) fn evidence(&self, yielding: bool) -> Evidence {
         Evidence::of_fixed_point(self.wildest, yielding)
     }
 
-    /// What a fixed point that has come to no end ends with.
+    /// The error with which a fixed-point iteration that did not converge ends.
     #[cold]
     pub(crate) fn stalled(&self, iterations: u32, control: &Control) -> StepError {
         // Without an iteration there is no increment.
@@ -211,14 +217,15 @@ impl Monitor {
         }
         let is_better = size < 0.5 * self.best;
         if is_better && size * size > self.tolerance * last {
-            // Most increments, neither the first nor the last: what follows, without what does not apply.
+            // The common case: neither the first nor the last increment. The rest of the function without what does not
+            // apply here.
             (self.rate, self.last) = (size / last, size);
             self.see_rate();
             (self.best, self.idle, self.risen) = (size, 0, 0);
             return Ok(Verdict::GoOn);
         }
         if is_better && last == f64::INFINITY {
-            // The first one tells no rate.
+            // The first increment gives no rate.
             (self.last, self.best) = (size, size);
             return Ok(if size <= self.tolerance {
                 Verdict::Converged
@@ -226,7 +233,8 @@ impl Monitor {
                 Verdict::GoOn
             });
         }
-        // What is left is the rest of a geometric series, size · ρ/(1 − ρ). Written without quotients: what follows waits for this decision.
+        // The remaining error is the rest of a geometric series, size · ρ/(1 − ρ). It is written without divisions,
+        // because everything else waits for this decision.
         let converged = if size >= last {
             size <= self.tolerance
         } else {
@@ -246,7 +254,7 @@ impl Monitor {
         }
         self.risen = if size >= last { self.risen + 1 } else { 0 };
         self.idle += 1;
-        // Near rest the velocities are noise themselves, and increments beside them say nothing.
+        // Near rest the velocities are rounding errors themselves, and increments relative to them mean nothing.
         let settled = increment.position <= 4.0 * f64::EPSILON;
         let stalled = (self.risen >= 1 && size <= ROUND_OFF)
             || (self.risen >= 3 && (size <= ROUGH_ROUND_OFF || settled))
@@ -258,7 +266,7 @@ impl Monitor {
         })
     }
 
-    /// Remembers the rate of the last increment if that tells something of the root.
+    /// Records the rate of the last increment if it is evidence about the root.
     #[inline(always)]
     fn see_rate(&mut self) {
         let rate = if self.last > Evidence::FAR {
@@ -271,8 +279,9 @@ impl Monitor {
         }
     }
 
-    /// Whether the last increment is the rounding of a stiff residual: with a matrix made just before it, Newton's method would have halved anything else.
-    /// Twice in a row, so that one unlucky step does not end the iteration.
+    /// Whether the last increment is the rounding error of a stiff residual: with a matrix factored just before it,
+    /// Newton's method would have halved any true error. It has to happen twice in succession, so that one unlucky step
+    /// does not end the iteration.
     #[cfg(feature = "sparse")]
     pub(crate) fn is_noise(&mut self, fresh: bool) -> bool {
         let idle = fresh && self.rate > 0.5 && self.last <= STIFF_ROUND_OFF;
@@ -280,24 +289,26 @@ impl Monitor {
         self.noise >= 2
     }
 
-    /// Whether the last increments are roundings of nearly dependent equations: small, or no longer moving the coordinates, and not halved any more by matrices made for
-    /// them. They may go to and fro between two values for ever. Constraints leave roundings of positions, which in velocities are as large as they are over the step.
+    /// Whether the last increments are rounding errors of nearly dependent equations: small, or no longer changing the
+    /// coordinates, and no longer halved by newly factored matrices. Such increments may alternate between two values
+    /// for ever. The rounding errors of positions under constraints appear in the velocities divided by the step.
     fn is_rounding(&self, fresh: bool) -> bool {
         let is_small = self.last <= ROUGH_ROUND_OFF || self.position <= POSITION_ROUND_OFF;
         fresh && self.idle >= IDLE && is_small
     }
 
-    /// Whether the increments have not been halved for so long that they never will be: they go to and fro between some values.
+    /// Whether the increments have not been halved for so long that they never will be: they cycle.
     pub(crate) fn is_stuck(&self) -> bool {
         self.idle >= MAX_IDLE
     }
 
-    /// Whether the last increment is below a rounding of what it adds to: what an iteration that contracts slowly may come to before its increments stop to fall.
+    /// Whether the last increment is below one rounding of what it is added to: a slowly contracting iteration may
+    /// reach this before its increments cease to decrease.
     pub(crate) fn is_at_round_off(&self) -> bool {
         self.last <= f64::EPSILON
     }
 
-    /// Whether so many more iterations would not do, at the present rate.
+    /// Whether the present rate is too slow to converge in the remaining iterations.
     #[inline(always)]
     pub(crate) fn is_hopeless(&self, remaining: u32) -> bool {
         let target = self.tolerance.max(64.0 * f64::EPSILON);
@@ -305,22 +316,23 @@ impl Monitor {
             return false;
         }
         if remaining >= 8 && self.rate < 0.05 && self.last <= 1e-4 {
-            // The eighth power is less than half of the smallest target, as below.
+            // The eighth power of such a rate is less than half of the smallest target, as below.
             return false;
         }
         let exponent = i32::try_from(remaining).unwrap_or(i32::MAX);
-        // Few iterations do where increments shrink well: most steps end here, with half of the target for roundings.
+        // At a good rate few iterations suffice: most steps return here. Half of the target is left for rounding
+        // errors.
         let squared = self.rate * self.rate;
         let eighth = (squared * squared) * (squared * squared);
         if exponent >= 8 && self.rate < 1.0 && self.last * eighth < 0.5 * target {
             return false;
         }
-        // It falls all the way, or it never does.
+        // Either the power falls below the target or it never does.
         self.last * integer_power(self.rate, exponent) > target
     }
 }
 
-/// Fixed-point iteration. With `yielding` it gives up as soon as Newton's method is the better way.
+/// Fixed-point iteration. With `yielding` it gives up as soon as Newton's method is cheaper.
 pub(crate) fn fixed_point<E>(
     equations: &mut E,
     control: &Control,
@@ -352,7 +364,7 @@ where
         if let Verdict::Converged = verdict {
             return monitor.evidence(yielding).check(control.solve);
         }
-        // The start is good to a few digits, so one evaluation of mass matrices mostly serves.
+        // The initial guess is accurate to a few digits, so that one evaluation of the mass matrices usually suffices.
         refresh = monitor.rate() > 0.1;
         if (yielding && iteration >= 2 && monitor.is_hopeless(most - iteration))
             || monitor.is_stuck()
@@ -367,20 +379,22 @@ where
     Err(monitor.stalled(iterations, control))
 }
 
-/// Where Newton's method begins.
+/// From where Newton's method starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Beginning {
-    /// Where a matrix may be far from that at the root: it is made anew as long as increments do not shrink well.
+    /// From a guess whose tangent may differ much from that at the root: the tangent is evaluated anew as long as
+    /// increments do not shrink well.
     Far,
-    /// Near the root: the first increment with a new matrix tells nothing of it, and a large one is tried once more.
+    /// From a guess near the root: the first increment with a new tangent says nothing about the rate, and after a
+    /// large one the tangent is tried once more.
     Near,
-    /// The scratch holds the factors of the last step.
+    /// The scratch memory holds the LU factors of the last step.
     Known,
 }
 
-/// Newton's method; the matrix is kept while it serves, also from step to step.
+/// Simplified Newton iteration: the LU factors are kept while they contract well enough, also from step to step.
 ///
-/// Says what speaks for the root. The factors of linear equations are kept throughout.
+/// Returns the evidence for the root. For linear equations the factors are always kept.
 #[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
 pub(crate) fn newton<E>(
     equations: &mut E,
@@ -393,11 +407,11 @@ where
     E: Equations,
 {
     let mut monitor = Monitor::new(control.tolerance);
-    // A small matrix is cheaper than the iterations that an old one would take more.
+    // Factoring a small matrix is cheaper than the additional iterations that old factors would need.
     let known = beginning == Beginning::Known && (linear || scratch.unknowns.len() >= SMALL);
     let mut fresh = !known;
     let (mut evidence, mut own) = (Evidence::of_newton(), false);
-    // A large matrix costs as much as many iterations with an old one.
+    // Factoring a large matrix costs as much as many iterations with old factors.
     let is_large = scratch.unknowns.len() >= LARGE;
     let good_enough = if is_large { 0.3 } else { 0.05 };
     let is_near = E::BY_NEWTON_ALONE && is_large && beginning == Beginning::Near;
@@ -413,7 +427,7 @@ where
         if fresh {
             equations.tangent(unknowns, step, tangent)?;
             lu::factor(unknowns.len(), tangent, pivots).map_err(|singular| {
-                // A NaN of the model shows here first.
+                // A NaN in the model shows up here first.
                 if tangent.iter().all(|entry| entry.is_finite()) {
                     StepError::SingularTangent {
                         unknown: singular.column,
@@ -439,13 +453,14 @@ where
         own |= fresh;
         evidence.see(increment, own);
         let verdict = monitor.judge(increment)?;
-        // Equations that are linear are solved once; a second solution takes away the rounding.
+        // Linear equations are solved once; a second solution removes the rounding error.
         let refined = linear && iteration > 0 && increment.relative <= ROUND_OFF;
         if refined || matches!(verdict, Verdict::Converged) || monitor.is_rounding(fresh) {
             equations.finish(unknowns, step)?;
             return Ok(evidence);
         }
-        // The first increment alone tells no rate: an old matrix may show a second one, and so may a large new one.
+        // The first increment alone gives no rate: old factors, and new factors of a large matrix, are allowed a second
+        // one.
         let is_tried = if is_near {
             uses > 1
         } else {

@@ -1,11 +1,11 @@
-//! The element equations in phase space: unknown are the rates of momenta and coordinates.
+//! The element equations in phase space, where the rates of momenta and coordinates are the unknowns.
 //!
 //! ```text
 //! π_k = (Q − H_q)(t_k, q_k, p_k) ,   κ_k = H_p(t_k, q_k, p_k) ,
 //! p_k = p₀ + h Σ_l A_kl π_l + Σ ω_k(τ*) J ,   q_k = q₀ + h Σ_l A_kl κ_l .
 //! ```
 //!
-//! For Hamiltonian models on two-field families. Unknowns are all π, then all κ.
+//! This form is used for Hamiltonian models on two-field families. The vector of unknowns contains all π, then all κ.
 
 use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::StepError;
@@ -17,12 +17,12 @@ pub(crate) struct PhaseForm<'a, M, const N: usize> {
     pub(crate) model: &'a M,
     pub(crate) scheme: SchemeRef<'a>,
     pub(crate) span: Span<'a, N>,
-    /// Momenta of the last sweep, and the velocities that the next one starts from.
+    /// The momenta of the last sweep, and the velocities from which the next one starts.
     pub(crate) momenta: &'a mut [[f64; N]],
     pub(crate) velocities: &'a mut [[f64; N]],
     /// H_pp at the stages.
     pub(crate) masses: &'a mut [f64],
-    /// Whether a sweep has filled all of this.
+    /// Whether `momenta`, velocities and `masses` have been filled by a sweep.
     pub(crate) swept: bool,
     pub(crate) statistics: &'a mut Statistics,
 }
@@ -76,7 +76,8 @@ where
         (t, q, self.momentum(k, pi))
     }
 
-    /// The momenta of the stages, and velocities that belong to them rather than to those before:
+    /// Computes the momenta of the stages, and predicts the velocities that belong to them rather than to the previous
+    /// momenta:
     ///
     /// ```text
     /// κ* = κ + H_pp (p − p_before)
@@ -116,7 +117,7 @@ where
         if damping == 0.0 {
             self.model.second(t, &q, &p, first, second);
         } else {
-            // Kernels write only what is not structurally zero: nothing of the last call may stay.
+            // Kernels write only structurally non-zero entries: nothing of the last call may remain.
             (*first, *second) = (First::ZERO, Second::ZERO);
             self.model.second(t, &q, &p, first, second);
             for a in 0..N {

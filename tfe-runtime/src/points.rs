@@ -1,4 +1,4 @@
-//! All points of an element at once, four to a register: the fixed-point iteration of smooth steps.
+//! The fixed-point iteration of smooth steps for all points of an element at once, four points in each register.
 //!
 //! The same equations as those of the other forms; for elements that are Runge–Kutta methods with K points, coefficients A, b, c:
 //!
@@ -49,14 +49,14 @@ use evaluation::Places;
 use forms::{is_phase, is_second_order};
 use inertia::Inertia;
 
-/// What steps with all points at once carry from one to the next: rows for groups of four points.
+/// What the stepper carries from one step to the next, in rows for groups of four points.
 #[derive(Clone, Debug)]
 pub(crate) struct Points<const N: usize, S: Storage> {
     tables: tables::Tables<S>,
     inertia: Inertia<N, S>,
-    /// Of the last step: L_q + Q, or π, rates of the momenta.
+    /// L_q + Q (or π) of the last step: the rates of the momenta.
     forces: S::Groups<Row<N>>,
-    /// ν, or κ: rates of the coordinates.
+    /// ν (or κ): the rates of the coordinates.
     rates: S::FirstOrder<Row<N>>,
     /// The velocity at its start, in equations of second order.
     velocity: [f64; N],
@@ -68,22 +68,22 @@ pub(crate) struct Points<const N: usize, S: Storage> {
     isa: Option<pulp::x86::V3>,
 }
 
-/// The unknowns of an element and everything that their iteration needs.
+/// The unknowns of an element, and scratch memory for their iteration.
 #[derive(Clone, Debug)]
 struct Work<const N: usize, S: Storage> {
     forces: S::Groups<Row<N>>,
     rates: S::FirstOrder<Row<N>>,
     momenta: S::FirstOrder<Row<N>>,
     velocities: S::FirstOrder<Row<N>>,
-    /// Products with the tables.
+    /// Products of the tables with the unknowns.
     products: S::Groups<Row<N>>,
     more_products: S::Groups<Row<N>>,
-    /// How far the velocity at the start reaches, in equations of second order.
+    /// The contribution of the velocity at the start, in equations of second order.
     drift: S::Groups<Row<N>>,
-    /// What low words of state and tables add at the points.
+    /// The contribution of the low words (rounding errors) of state and tables at the points.
     low_position: S::FirstOrder<Row<N>>,
     low_momentum: S::FirstOrder<Row<N>>,
-    /// Factors of L_vv, or H_pp, where they are not constant.
+    /// The LU factors of L_vv, or H_pp, where they are not constant.
     masses: S::Varying<[Row<N>; N]>,
     velocity: [f64; N],
     velocity_low: [f64; N],
@@ -92,7 +92,7 @@ struct Work<const N: usize, S: Storage> {
     speed: f64,
 }
 
-/// Where and from where, and by what.
+/// The input of one step: its start, length and time.
 struct Leg<'a, const N: usize, S: Storage> {
     t: f64,
     h: f64,
@@ -109,18 +109,20 @@ pub(crate) enum Together {
     LeftToOthers,
 }
 
-/// What has come of its iteration.
+/// The outcome of the iteration.
 struct Outcome<const N: usize> {
-    /// The end of the step, and what rounding took from it; of no meaning after a failure. Not in one with it: the numbers would be taken to pieces.
+    /// The end of the step and its rounding error, which have no meaning after a failure. They are not inside an enum
+    /// variant, because the compiler would then take the numbers apart.
     end: (State<N>, State<N>),
     failure: Option<StepError>,
     iterations: u32,
-    /// The ratio of the last increment to that before.
+    /// The ratio of the last increment to the one before.
     contraction: f64,
 }
 
 impl<const N: usize, S: Storage> Points<N, S> {
-    /// For a nonlinear model without constraints, and an element of no more than 16 points that has the form.
+    /// `None` unless the model is nonlinear and without constraints, and the element has at most 16 points and one of
+    /// these forms.
     pub(crate) fn new<M>(model: &M, tables: tables::Tables<S>) -> Option<Self>
     where
         M: Model<N>,
@@ -143,12 +145,12 @@ impl<const N: usize, S: Storage> Points<N, S> {
         })
     }
 
-    /// Says that the next step does not continue the last one.
+    /// Declares that the next step does not continue the last one.
     pub(crate) fn forget(&mut self) {
         self.is_warm = false;
     }
 
-    /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
+    /// Copies rates and forces of the last step to where an ordinary step expects them; false if there is no last step.
     pub(crate) fn write_back<M>(&mut self, tables: &impl Tables, numbers: &mut [f64]) -> bool
     where
         M: Model<N>,
@@ -175,7 +177,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
         true
     }
 
-    /// Constant rates.
+    /// Constant rates as initial guess.
     #[cold]
     fn start_cold<M>(&mut self, model: &M, t: f64, start: &State<N>)
     where
@@ -188,7 +190,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
         }
     }
 
-    /// Rates of coordinates and momenta at the points of the last step, a row of N for each point.
+    /// The rates of coordinates and momenta at the points of the last step, a row of N for each point.
     fn unknowns<M>(&mut self, rates: &mut [f64], forces: &mut [f64])
     where
         M: Model<N>,
@@ -201,7 +203,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
         spread(&self.forces, forces);
     }
 
-    /// The unknown rates of an element with more points than these, a row of N for each.
+    /// The unknown rates of an element with more points than unknown rates, a row of N for each.
     fn unknown_rates<M>(&self, scheme: &SchemeRef<'_>, forces: &[f64], rates: &mut [f64])
     where
         M: Model<N>,
@@ -228,7 +230,8 @@ impl<const N: usize, S: Storage> Points<N, S> {
         }
     }
 
-    /// Velocities at the points of equations of second order, which their iteration does not need, a row of N for each.
+    /// The velocities at the points, which the iteration of the equations of second order does not need; a row of N for
+    /// each.
     fn set_rates<M>(&mut self, rates: &mut [f64])
     where
         M: Model<N>,
@@ -242,7 +245,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
     }
 }
 
-/// From groups of four points to a row of N for each.
+/// Converts groups of four points to a row of N for each point.
 fn spread<const N: usize>(groups: &[Row<N>], rows: &mut [f64]) {
     for (group, rows) in groups.iter().zip(rows.as_chunks_mut::<N>().0.chunks_mut(4)) {
         for (lane, row) in rows.iter_mut().enumerate() {
@@ -253,7 +256,7 @@ fn spread<const N: usize>(groups: &[Row<N>], rows: &mut [f64]) {
     }
 }
 
-/// Writes velocities at the points of equations of second order.
+/// Computes velocities at the points for equations of second order.
 struct Velocities<'a, M, S: Storage, const N: usize> {
     points: &'a mut Points<N, S>,
     rates: &'a mut [f64],
@@ -336,14 +339,14 @@ impl<const N: usize, S: Storage> Work<N, S> {
     }
 }
 
-/// How many groups of each kind a model needs: short runs notice how much memory is asked for.
+/// The number of groups of each kind that a model needs: in short runs the amount of memory matters.
 struct Needed {
     groups: usize,
-    /// Of equations of first order.
+    /// For equations of first order.
     first: usize,
-    /// Of phase space.
+    /// For phase space.
     phase: usize,
-    /// Of mass matrices that vary.
+    /// For mass matrices that vary.
     masses: usize,
 }
 
@@ -360,7 +363,8 @@ impl Needed {
     }
 }
 
-/// Rates of momenta and coordinates at the start, for a first iteration that continues nothing; those of momenta are zero where they are no unknowns.
+/// The rates of momenta and coordinates at the start, as a cold initial guess; those of momenta are zero where they are
+/// not unknowns.
 pub(crate) fn constant_rates<M, const N: usize>(
     model: &M,
     t: f64,
@@ -397,7 +401,7 @@ fn largest<const N: usize>(numbers: &[f64; N]) -> f64 {
 fn is_finite<const N: usize>(state: &State<N>) -> bool {
     let mut zero = 0.0;
     for a in 0..N {
-        // Zero times what is not finite is a NaN.
+        // Zero times a number that is not finite is NaN.
         zero += 0.0 * state.q[a] + 0.0 * state.p[a];
     }
     zero == 0.0

@@ -1,17 +1,17 @@
-//! Numbers whose products and sums can be had exactly.
+//! Scalars with error-free products and sums.
 
 use crate::double_double::DoubleDouble;
 use crate::real::{Real, fused};
 
-/// Numbers whose products and sums can be had exactly.
+/// Scalars with error-free products and sums (a result and its rounding error).
 pub trait Precise: Real {
-    /// The product and what rounding takes from it, exactly.
+    /// The product and its rounding error, exactly.
     fn product(self, other: Self) -> (Self, Self);
 
     /// `self` · `factor` + `term` with one rounding ([`fused`]).
     fn times_plus(self, factor: Self, term: Self) -> Self;
 
-    /// The sum and what rounding takes from it, exactly.
+    /// The sum and its rounding error, exactly.
     #[inline(always)]
     fn exact_sum(self, other: Self) -> (Self, Self) {
         let high = self + other;
@@ -26,14 +26,14 @@ pub trait Precise: Real {
     }
 }
 
-/// weight · value, and what rounding takes from it and took from the weight.
+/// weight · value, and its rounding error, including the contribution of that of the weight.
 #[inline(always)]
 pub(crate) fn exact_term<V: Precise>((weight, weight_low): (V, V), value: V) -> (V, V) {
     let (product, rest) = weight.product(value);
     (product, weight_low.times_plus(value, rest))
 }
 
-/// Adds a term, each a number and what rounding took from it.
+/// Adds a term to a sum; both are pairs of a number and its rounding error.
 #[inline(always)]
 pub(crate) fn add_exactly<V: Precise>(sum: &mut (V, V), (term, term_low): (V, V)) {
     let (high, lost) = sum.0.exact_sum(term);

@@ -1,7 +1,8 @@
-//! Steps of linear models with constant coefficients: the same matrix every time.
+//! Steps of linear models with constant coefficients, by one product with a matrix (propagator) that is the same in
+//! every step.
 //!
-//! A step of length h is affine, y₁ = y₀ + D y₀ + c with y = (p, q). D is kept instead of A = 1 + D: its entries are small with h, so that their
-//! rounding is as well, and the sum is compensated as that of any other step.
+//! A step of length h is affine, y₁ = y₀ + D y₀ + c with y = (p, q). D is stored instead of A = 1 + D, because its
+//! entries, and with them their rounding errors, are small with h. The sum is compensated as that of any other step.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -10,7 +11,8 @@ use crate::method::sum;
 use crate::model::State;
 use crate::real::Real;
 
-/// A start so far away that constant increments of such a size take no digits from what it does. A power of two.
+/// A power of two so large that, for a start of that size, the constant part of the increment does not spoil the digits
+/// of the linear part.
 fn far(constant: &[f64]) -> f64 {
     const FAR: i32 = 40;
     const FARTHEST: i32 = 900;
@@ -20,7 +22,7 @@ fn far(constant: &[f64]) -> f64 {
     Real::powi(2.0, (FAR + exponent(size)).min(FARTHEST))
 }
 
-/// e of 2ᵉ ≤ size < 2ᵉ⁺¹, for a size of at least one.
+/// The exponent e of 2ᵉ ≤ size < 2ᵉ⁺¹, for a size of at least one.
 fn exponent(size: f64) -> i32 {
     const BITS: u32 = f64::MANTISSA_DIGITS - 1;
     const BIAS: i32 = f64::MAX_EXP - 1;
@@ -30,16 +32,16 @@ fn exponent(size: f64) -> i32 {
 /// The increment of a step as a function of its start.
 #[derive(Clone, Debug)]
 pub(crate) struct Propagator<const N: usize> {
-    /// The length of the step.
+    /// The length of the step for which it was made.
     h: f64,
-    /// D by columns, 2N of 2N numbers, and c as the last column.
+    /// The columns of D, 2N of 2N numbers each, and c as the last column.
     columns: Vec<f64>,
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     isa: Option<pulp::x86::V3>,
 }
 
 impl<const N: usize> Propagator<N> {
-    /// From the increments of steps: `step` gives that of a start.
+    /// Builds the propagator from increments of steps; `step` gives the increment for a start.
     pub(crate) fn of<E>(
         h: f64,
         mut step: impl FnMut(&State<N>) -> Result<State<N>, E>,
@@ -71,12 +73,12 @@ impl<const N: usize> Propagator<N> {
         })
     }
 
-    /// Whether it is of this length.
+    /// Whether it was made for this step length.
     pub(crate) fn is_of(&self, h: f64) -> bool {
         self.h == h
     }
 
-    /// Moves a state that is `low` more than its rounded numbers, both in place; false, and both as they were, where the end is not finite.
+    /// Moves a state with rounding error `low`, both in place; false, with both unchanged, where the end is not finite.
     pub(crate) fn advance(&self, state: &mut State<N>, low: &mut State<N>) -> bool {
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
         if let Some(isa) = self.isa {
@@ -112,7 +114,7 @@ impl<const N: usize> Propagator<N> {
             (end.p[a], end_low.p[a]) = sum(state.p[a], change.p[a] + low.p[a]);
             zero += 0.0 * end.p[a];
         }
-        // Infinities and what is no number give no zero.
+        // Zero times an infinity or a NaN is not zero.
         if zero != 0.0 || zero.is_nan() {
             return false;
         }
@@ -121,7 +123,7 @@ impl<const N: usize> Propagator<N> {
     }
 }
 
-/// Adds columns times factors, four at a time: each partial sum is loaded once for four products.
+/// Adds columns times factors, four columns at a time, so that each partial sum is loaded once for four products.
 #[inline(always)]
 fn add<const N: usize>(columns: &[f64], factors: &[f64; N], sum: &mut State<N>) {
     let halves = columns.as_chunks::<N>().0;

@@ -1,4 +1,5 @@
-//! What a loss has of outputs and velocities goes on to states and parameters: by one evaluation backwards for all of them (T-127, T-149).
+//! Pull-back of the derivatives of a loss by outputs and velocities to states and parameters, with one backward
+//! evaluation for all of them (T-127, T-149).
 
 use crate::constrained::HeldVelocity;
 use crate::error::{ConstraintError, StepError, TransitionError};
@@ -9,21 +10,21 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::RefCell;
 
-/// What a loss ℓ has directly of a place of a motion.
+/// The direct partial derivatives of a loss ℓ at one place of a motion.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Partials {
-    /// ∂ℓ/∂q; as many numbers as the model has coordinates, as of the next two.
+    /// ∂ℓ/∂q; this and the next two have one number for each coordinate of the model.
     pub q: Vec<f64>,
     /// ∂ℓ/∂p
     pub p: Vec<f64>,
     /// ∂ℓ/∂v
     pub v: Vec<f64>,
-    /// By the outputs, one number a column.
+    /// By the outputs, one number for each column.
     pub outputs: Vec<f64>,
 }
 
 impl Partials {
-    /// Nothing, of a model with so many coordinates and columns of outputs.
+    /// Zero derivatives, for a model with this number of coordinates and of columns of outputs.
     #[must_use]
     pub fn none(coordinates: usize, columns: usize) -> Self {
         let zeros = || vec![0.0; coordinates];
@@ -35,41 +36,42 @@ impl Partials {
         }
     }
 
-    /// Whether it has anything of outputs.
+    /// Whether the loss depends on outputs.
     pub(crate) fn sees_outputs(&self) -> bool {
         self.outputs.iter().any(|weight| *weight != 0.0)
     }
 }
 
-/// A place of a motion, and what a loss has directly of it.
+/// A place of a motion, with the direct derivatives of a loss there.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<'a, S, V> {
-    /// Its time.
+    /// The time.
     pub t: f64,
     /// Coordinates and momenta.
     pub state: &'a S,
-    /// The velocity of that momentum.
+    /// The velocity that belongs to the momentum.
     pub v: &'a V,
-    /// What the loss has of it.
+    /// The derivatives of the loss.
     pub partials: &'a Partials,
 }
 
-/// Takes derivatives of a loss from outputs and velocities to states and to all parameters of a model, whose sums it keeps.
+/// Converts derivatives of a loss by outputs and velocities into derivatives by states and by all parameters of a
+/// model; it accumulates the latter.
 ///
 /// ```text
 /// w = L_vv⁻¹ (∂ℓ/∂v + y_vᵀ ∂ℓ/∂y) ,     λ_p += ∂ℓ/∂p + w ,     λ_q += ∂ℓ/∂q + y_qᵀ ∂ℓ/∂y − L_vqᵀ w ,     dℓ/da += y_aᵀ ∂ℓ/∂y − L_vaᵀ w
 /// ```
 ///
-/// of a Lagrangian; of a Hamiltonian, whose outputs are functions of momenta, v = H_p.
+/// for a Lagrangian; for a Hamiltonian, whose outputs are functions of momenta, v = H_p.
 #[derive(Clone, Debug)]
 pub struct Pull<'m, M, const N: usize> {
     model: &'m M,
-    /// Parameters, then coordinates, then velocities (momenta).
+    /// The variables of the tape: parameters, then coordinates, then velocities (momenta).
     tape: Tape,
     parameters: usize,
 }
 
-/// Which results of a kernel.
+/// The kernel results that are differentiated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Results {
     /// L_v, or H_p.
@@ -78,7 +80,7 @@ pub(crate) enum Results {
 }
 
 impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
-    /// Sums of all parameters, zeros.
+    /// Zero sums for all parameters.
     #[must_use]
     pub fn new(model: &'m M) -> Self {
         let parameters = model.parameters();
@@ -97,10 +99,12 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
         self.tape.sum(index)
     }
 
-    /// Adds what the loss has of a state with its velocity to the sums of the parameters; gives what it has of the state.
+    /// Adds the derivatives by the parameters at a state with its velocity to their sums, and returns the derivatives
+    /// by the state.
     ///
     /// # Errors
-    /// [`TransitionError`] where L_vv is singular and the loss has anything of the velocity, and for vectors of other lengths.
+    /// [`TransitionError`] where L_vv is singular and the loss depends on the velocity, and for vectors of other
+    /// lengths.
     pub fn see(
         &mut self,
         t: f64,
@@ -118,7 +122,7 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
         Ok(by_state)
     }
 
-    /// The same of several places, four side by side; `each` is given what the loss has of them, in their order.
+    /// The same for several places, four side by side; `each` receives the derivatives by their states, in their order.
     ///
     /// # Errors
     /// As [`see`](Self::see).
@@ -149,7 +153,7 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
         &mut self,
         places: &[Sight<'_, State<N>, [f64; N]>],
     ) -> Result<[State<N>; LANES], StepError> {
-        // Where there are no more places the first one stands, without weights.
+        // Unused lanes repeat the first place with zero weights.
         let at = |lane: usize| &places[if lane < places.len() { lane } else { 0 }];
         let weight = |number: &dyn Fn(&Partials) -> f64| -> Row {
             core::array::from_fn(|lane| {
@@ -206,7 +210,8 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
         }))
     }
 
-    /// From weights of a velocity to those of its momentum; what constraints have of coordinates where they are needed for that, and of parameters.
+    /// Converts weights of a velocity to weights of its momentum. Where constraints are needed for that, adds their
+    /// contributions to the sums of parameters, and returns those to the derivatives by q (else zeros).
     fn divide_by_mass(
         &mut self,
         place: &Sight<'_, State<N>, [f64; N]>,
@@ -227,7 +232,7 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
         Ok([0.0; N])
     }
 
-    /// Weights of A and a at one place to q, and to the sums of parameters.
+    /// Adds the contributions of the weights of A and a at one place to those of q, and to the sums of parameters.
     fn pulled_rows(
         &mut self,
         t: f64,
@@ -256,7 +261,7 @@ impl<'m, M: Model<N>, const N: usize> Pull<'m, M, N> {
         core::array::from_fn(|a| self.tape.take_row(parameters + a)[0])
     }
 
-    /// Weights of results to q and z, and to the sums of parameters.
+    /// Adds the contributions of the weights of kernel results to those of q and z, and to the sums of parameters.
     fn pulled(
         &mut self,
         (t, q, z): (Row, &[Row; N], &[Row; N]),

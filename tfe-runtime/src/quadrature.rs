@@ -1,7 +1,7 @@
-//! Rules of numerical integration on the unit interval, computed to full double precision.
+//! Quadrature rules on the unit interval, computed to full double precision.
 //!
-//! Nodes come from Newton's method on Legendre polynomials in twice the working precision; every
-//! function is `const`, so that a solver for one element holds its rule as a constant.
+//! Nodes are found by Newton's method on Legendre polynomials in twice the working precision. Every function is
+//! `const`, so that a solver for one element holds its rule as a constant.
 
 use crate::double_double::DoubleDouble;
 
@@ -41,7 +41,7 @@ impl Quadrature {
             ..Self::EMPTY
         };
         let mut i = 0;
-        // The lower half, and its mirror image: the rule is symmetric to the last digit.
+        // The lower half and its mirror image: the rule is symmetric to the last digit.
         while i < k.div_ceil(2) {
             let angle = PI * (4 * i + 3) as f64 / (4 * k + 2) as f64;
             let x = if 2 * i + 1 == k {
@@ -125,13 +125,13 @@ impl Quadrature {
         self.count
     }
 
-    /// Never: a rule has at least one point.
+    /// Always false: a rule has at least one point.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Node τᵢ ∈ [0, 1], rounded to the nearest double; zero beyond the last.
+    /// Node τᵢ ∈ [0, 1], rounded to the nearest double; zero for larger indices.
     #[must_use]
     pub const fn node(&self, index: usize) -> f64 {
         if index < MAX_POINTS {
@@ -141,7 +141,7 @@ impl Quadrature {
         }
     }
 
-    /// Weight wᵢ, rounded to the nearest double; the weights add up to one. Zero beyond the last.
+    /// Weight wᵢ, rounded to the nearest double; the weights add up to one. Zero for larger indices.
     #[must_use]
     pub const fn weight(&self, index: usize) -> f64 {
         if index < MAX_POINTS {
@@ -151,7 +151,7 @@ impl Quadrature {
         }
     }
 
-    /// What rounding took from [`node`](Self::node): the exact value is the sum of both.
+    /// The rounding error of [`node`](Self::node): the exact value is the sum of both.
     #[must_use]
     pub const fn node_correction(&self, index: usize) -> f64 {
         if index < MAX_POINTS {
@@ -161,7 +161,7 @@ impl Quadrature {
         }
     }
 
-    /// What rounding took from [`weight`](Self::weight).
+    /// The rounding error of [`weight`](Self::weight): the exact value is the sum of both.
     #[must_use]
     pub const fn weight_correction(&self, index: usize) -> f64 {
         if index < MAX_POINTS {
@@ -192,7 +192,7 @@ const fn clamp(points: usize, least: usize) -> usize {
     }
 }
 
-/// cos x on [0, π] by its series: a start for Newton's method needs no more.
+/// cos x on [0, π] by its series, accurate enough for the start of Newton's method.
 const fn cosine(x: f64) -> f64 {
     if x > 0.5 * PI {
         return -cosine(PI - x);
@@ -237,7 +237,7 @@ impl Legendre {
     }
 }
 
-/// Whose root is sought.
+/// The polynomial whose root is sought.
 #[derive(Clone, Copy)]
 enum Polynomial {
     /// P_k
@@ -253,7 +253,7 @@ const fn root(polynomial: Polynomial, degree: usize, start: f64) -> DoubleDouble
     let mut x = DoubleDouble::new(start);
     let k = DoubleDouble::integer(degree);
     let mut round = 0;
-    // Starts are good to 10⁻² at worst, so that six doublings of the digits reach 10⁻³².
+    // The initial guesses have errors of at most 10⁻², so that six doublings of the correct digits reach 10⁻³².
     while round < 7 {
         let legendre = Legendre::at(degree, x);
         let slope = legendre.slope(degree, x);

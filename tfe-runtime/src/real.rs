@@ -22,15 +22,16 @@ pub trait Real:
 
     /// The nearest number to `value`.
     fn from_f64(value: f64) -> Self;
-    /// `value` as a number of the same kind as `self`: what kernels make their constants of. Numbers that live in registers of the
-    /// processor know from `self` that it has them.
+    /// `value` as a number of the same kind as `self`: kernels make their constants with it. `self` carries what a
+    /// number in processor registers needs to know, such as the instruction set.
     #[inline(always)]
     #[must_use]
     fn like(self, value: f64) -> Self {
         Self::from_f64(value)
     }
-    /// The parameter `index` of a model ([`Model::parameter_name`](crate::Model::parameter_name)), of this value, as a number of the same kind as `self`: what kernels
-    /// make of the fields of a model. A number that carries a derivative by a parameter knows from `self` by which.
+    /// The parameter `index` of a model ([`Model::parameter_name`](crate::Model::parameter_name)) with this value, as a
+    /// number of the same kind as `self`: kernels make it from the fields of a model. If `self` carries the index of a
+    /// parameter by which derivatives are taken, that parameter gets its slope here.
     #[inline(always)]
     #[must_use]
     fn parameter(self, _index: usize, value: f64) -> Self {
@@ -90,21 +91,22 @@ pub trait Real:
     fn less_or_equal(self, other: Self) -> Self::Mask;
     /// `then` where the mask holds, `otherwise` elsewhere.
     fn select(mask: Self::Mask, then: Self, otherwise: Self) -> Self;
-    /// A function of numbers that is not known to kernels, such as an input of a model; lane by lane. NaN of a scalar that does not say how.
+    /// Applies a function that kernels do not know, such as an input of a model, lane by lane. The default, for scalars
+    /// that do not implement it, is NaN.
     #[must_use]
     fn map(self, _function: &mut dyn FnMut(f64) -> f64) -> Self {
         self.like(f64::NAN)
     }
-    /// The same where all derivatives are known, `derivatives(k, x)` the k-th at x and `derivatives(0, x)` the function: numbers with slopes take these, and no differences, which would see what
-    /// lies on the other side of a jump.
+    /// The same with known derivatives: `derivatives(k, x)` is the k-th derivative at x, and `derivatives(0, x)` the
+    /// function. Numbers with slopes use these instead of differences, which would see the other side of a jump.
     #[must_use]
     fn map_with_derivatives(self, derivatives: &mut dyn FnMut(u32, f64) -> f64) -> Self {
         self.map(&mut |x| derivatives(0, x))
     }
 }
 
-/// x y + z with one rounding, as an instruction of processors does it that have registers for lanes; without the feature `simd`, where it would be a call of a function, with
-/// two. Programs give the same digits on every processor.
+/// x y + z with one rounding on processors with vector registers, where it is one instruction; with two roundings
+/// without the feature `simd`, where it would be a function call. A program gives the same digits on every processor.
 #[inline(always)]
 pub(crate) fn fused(x: f64, y: f64, z: f64) -> f64 {
     #[cfg(all(feature = "simd", feature = "std"))]

@@ -1,4 +1,5 @@
-//! Numbers in registers of the processor: four points or eight trajectories side by side, and where they are kept between steps.
+//! Scalars in registers of the processor: four points or eight trajectories side by side, and the storage that keeps
+//! them between steps.
 
 pub(crate) mod four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]

@@ -1,14 +1,15 @@
-//! The root of a function of one number in a bracket.
+//! The root of a scalar function in a bracket.
 
 use core::ops::Range;
 
-/// Evaluations that a root may cost.
+/// The largest number of evaluations for one root.
 const MAX_EVALUATIONS: u32 = 100;
 
-/// The root of a function that is on `side` of zero (its sign) at the start of the bracket and not at its end, by false position with halved weights (Illinois) and
-/// bisection where that is slow.
+/// The root of a function whose sign is `side` at the start of the bracket and different at its end, by false position
+/// with halved weights (Illinois), and by bisection where that is slow.
 ///
-/// It is a place on the other side, or zero, within `resolution` of one that is not; the start, where the function is not on its side there.
+/// The result is a place at which the function is zero or has the other sign, within `resolution` of one where its sign
+/// is `side`; or the start, if the sign is not `side` there.
 pub fn root(
     bracket: Range<f64>,
     side: f64,
@@ -19,7 +20,7 @@ pub fn root(
         start: mut from,
         end: mut to,
     } = bracket;
-    // Weights of false position: their signs never change.
+    // The weights of false position: their signs never change.
     let (mut low, mut high) = (side * value(from), side * value(to));
     if !(low > 0.0) {
         return from;

@@ -30,42 +30,42 @@ use crate::element::ElementError;
 use crate::tableau::Target;
 
 pub use crate::basis::MAX_RATES;
-/// Borrowed tables of an element, K points and U unknown rates; matrices are flat, row by row.
+/// Borrowed tables of an element with K points and U unknown rates; matrices are flat, row by row.
 #[derive(Clone, Copy, Debug)]
 pub struct SchemeRef<'a> {
-    /// Whose tables these are.
+    /// The element to which the tables belong.
     pub element: Element,
     /// E = P = 1 and C = G: a Runge–Kutta method with its points as stages.
     pub collocated: bool,
-    /// c_l: where the model is evaluated; K.
+    /// c_l: the points at which the model is evaluated; K.
     pub nodes: &'a [f64],
     /// b_l; K.
     pub weights: &'a [f64],
-    /// What rounding took from b; K.
+    /// The rounding error of b; K.
     pub weights_low: &'a [f64],
-    /// Where the unknown rates sit; U.
+    /// The places of the unknown rates; U.
     pub unknown_nodes: &'a [f64],
-    /// E_lj: unknown rates to velocities; K × U.
+    /// E_lj: from unknown rates to velocities; K × U.
     pub velocity: &'a [f64],
-    /// C_lj: unknown rates to coordinates; K × U.
+    /// C_lj: from unknown rates to coordinates; K × U.
     pub position: &'a [f64],
-    /// What rounding took from C; K × U.
+    /// The rounding error of C; K × U.
     pub position_low: &'a [f64],
-    /// P_il: momenta to rows; U × K.
+    /// P_il: from momenta to rows; U × K.
     pub momentum: &'a [f64],
-    /// G_il: forces to rows; U × K.
+    /// G_il: from forces to rows; U × K.
     pub force: &'a [f64],
-    /// What rounding took from G; U × K.
+    /// The rounding error of G; U × K.
     pub force_low: &'a [f64],
-    /// β_j: unknown rates to the end; U.
+    /// β_j: from unknown rates to the coordinates at the end; U.
     pub advance: &'a [f64],
-    /// What rounding took from β; U.
+    /// The rounding error of β; U.
     pub advance_low: &'a [f64],
-    /// Legendre coefficients of ω_i(τ), the weight that row i gives an impulse at τ; U × 12.
+    /// Legendre coefficients of ω_i(τ), the weight of an impulse at τ in row i; U × 12.
     pub impulse: &'a [f64],
-    /// Unknown rates to the Legendre coefficients of dq/dτ / h; (n − 1) × U.
+    /// From unknown rates to the Legendre coefficients of dq/dτ / h; (n − 1) × U.
     pub rate: &'a [f64],
-    /// Forces to the Legendre coefficients of dp/dτ / h; (n − 1) × K.
+    /// From forces to the Legendre coefficients of dp/dτ / h; (n − 1) × K.
     pub force_rate: &'a [f64],
 }
 
@@ -84,7 +84,7 @@ impl SchemeRef<'_> {
         self.nodes.len()
     }
 
-    /// The number U of unknown rates a coordinate.
+    /// The number U of unknown rates of each coordinate.
     #[inline]
     #[must_use]
     pub fn unknowns(&self) -> usize {
@@ -98,7 +98,7 @@ impl SchemeRef<'_> {
         self.element.degree()
     }
 
-    /// ω_i(τ): the weight that row i gives an impulse at τ; the end has weight one.
+    /// ω_i(τ): the weight of an impulse at τ in row i; in the momentum at the end its weight is one.
     #[must_use]
     pub fn impulse_weight(&self, row: usize, tau: f64) -> f64 {
         let mut values = [0.0; MAX_NODES];
@@ -111,7 +111,7 @@ impl SchemeRef<'_> {
     }
 }
 
-/// Something that holds the tables of an element.
+/// A type that holds the tables of an element.
 ///
 /// Algorithms are generic over it, so that for a [`Scheme`] every length is a constant.
 pub trait Tables {
@@ -257,8 +257,8 @@ impl<const K: usize, const U: usize> Tables for Scheme<K, U> {
 
 /// Tables of an element chosen at run time; clones share them.
 ///
-/// With the feature `std` the tables of an element are computed once in a program: in double-double arithmetic they cost as much as a
-/// hundred steps.
+/// With the feature `std`, the tables of an element are computed once in a program: the double-double arithmetic costs
+/// as much as a hundred steps.
 #[cfg(feature = "alloc")]
 #[derive(Clone, Debug)]
 pub struct SchemeTable {
@@ -266,7 +266,7 @@ pub struct SchemeTable {
     parts: alloc::sync::Arc<Parts>,
 }
 
-/// The numbers of all tables: each a slice of its own, so that what is not asked for of a view costs nothing.
+/// The numbers of all tables, each in a slice of its own, so that the parts of a view that are not used cost nothing.
 #[cfg(feature = "alloc")]
 #[derive(Debug)]
 struct Parts {
@@ -290,7 +290,7 @@ struct Parts {
 #[cfg(feature = "alloc")]
 type Numbers = alloc::boxed::Box<[f64]>;
 
-/// The tables computed so far. There are a few hundred elements in all.
+/// The tables computed so far. There are a few hundred different elements in all.
 #[cfg(feature = "std")]
 static KNOWN: std::sync::Mutex<std::vec::Vec<SchemeTable>> =
     std::sync::Mutex::new(std::vec::Vec::new());
@@ -305,7 +305,7 @@ impl SchemeTable {
         element.validate()?;
         #[cfg(feature = "std")]
         {
-            // A panic elsewhere leaves the list as good as it was.
+            // The list is valid even if another thread has panicked.
             let mut known = KNOWN
                 .lock()
                 .unwrap_or_else(std::sync::PoisonError::into_inner);

@@ -1,21 +1,22 @@
-//! A model that is borrowed, or that belongs to those that use it.
+//! A model that is either borrowed or owned by those that use it.
 
 use alloc::boxed::Box;
 use alloc::sync::Arc;
 use core::fmt;
 use core::ops::Deref;
 
-/// A model that steppers use: the caller's, or one made for a run, which is theirs.
+/// A model that steppers use: borrowed from the caller, or made for a run and owned by it.
 ///
-/// The latter goes to other threads though nothing is known of M: what cannot is refused where it is made.
+/// An owned model may be sent to other threads although nothing is known about M: where it is made, it is required to
+/// be `Send + Sync`.
 pub enum Share<'m, M> {
-    /// The caller's.
+    /// Borrowed from the caller.
     Borrowed(&'m M),
-    /// One made for a run.
+    /// Made for a run.
     Owned(Owned<'m, M>),
 }
 
-/// A model that all who hold it own.
+/// A model shared by all who hold it.
 type Owned<'m, M> = Arc<dyn Deref<Target = M> + Send + Sync + 'm>;
 
 impl<'m, M: Send + Sync + 'm> Share<'m, M> {

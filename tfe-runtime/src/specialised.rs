@@ -1,4 +1,4 @@
-//! The engine of emitted solvers: a stepper for one element, all of its memory in place.
+//! The engine of emitted solvers: a stepper for one element and one step length, with all memory inside the struct.
 
 use crate::cut::{Halving, in_halves, may_be_cut};
 use crate::element::Element;
@@ -15,14 +15,17 @@ use crate::statistics::Statistics;
 use crate::workspace::Workspace;
 use core::convert::Infallible;
 
-/// Whether programs may be large: not without an allocator. There steps go one point after the other (all at once are 1.3 to 3.4 times as fast without wide registers, and take
-/// 12 kilobytes more for a pendulum) and are not cut (8 kilobytes).
+/// Whether the program may be large, which is assumed if it has an allocator. Otherwise steps evaluate one point after
+/// the other (evaluating all at once is 1.3 to 3.4 times as fast even without wide registers, but takes 12 kilobytes
+/// more for a pendulum) and are not cut (which would take 8 kilobytes).
 const IS_LARGE: bool = cfg!(feature = "alloc");
 
-/// A step of so many registers of unknowns is made anew; more are kept, as they live in memory anyway.
+/// With at most this many registers of unknowns, the memory of a step is made anew in each step; larger memory is kept,
+/// as it does not fit into registers anyway.
 const MOST_IN_REGISTERS: usize = 8;
 
-/// The sizes of [`Inline`](crate::registers::storage::Inline) for a model and an element; zeros where steps go one point after the other.
+/// The sizes of [`Inline`](crate::registers::storage::Inline) for a model and an element; zeros where steps evaluate
+/// one point after the other.
 #[must_use]
 pub const fn sizes<M, const N: usize>(element: Element) -> [usize; 7]
 where
@@ -38,22 +41,22 @@ where
     } else {
         (groups, 0)
     };
-    // Matrices of several registers of points are memory in any case.
+    // Matrices for several registers of points are in memory in any case.
     let is_much = N * groups > MOST_IN_REGISTERS || !M::FACTS.constant_mass && groups > 1;
     let kept = if is_much { 1 } else { 0 };
     let projected = if is_projected::<M, N>(&element) { 1 } else { 0 };
     [points, groups, first, varying, square, kept, projected]
 }
 
-/// Steps of one length, with all memory in place.
+/// Steps of one length, with all memory inside the struct.
 #[derive(Clone, Debug)]
 pub struct Specialised<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize> {
     start: f64,
     step: f64,
-    /// A whole number, as what the time is computed from in each step.
+    /// The number of steps so far, from which the time is computed in each step.
     steps: f64,
     memory: Memory<N>,
-    /// All points at once, where model and element allow it.
+    /// Evaluates all points at once, where model and element allow it.
     points: Option<Points<N, S>>,
     numbers: [f64; NUMBERS],
     pivots: [usize; PIVOTS],
@@ -62,7 +65,7 @@ pub struct Specialised<const N: usize, S: Storage, const NUMBERS: usize, const P
 impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
     Specialised<N, S, NUMBERS, PIVOTS>
 {
-    /// At rest at time zero.
+    /// A solver at time zero that has made no step.
     #[must_use]
     pub fn new<M>(model: &M, tables: S::Fixed, step: f64) -> Self
     where
@@ -83,7 +86,7 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
         }
     }
 
-    /// The time of the next step's start.
+    /// The time at which the next step starts.
     #[must_use]
     pub fn time(&self) -> f64 {
         self.start + self.steps * self.step
@@ -94,19 +97,20 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
         (self.start, self.steps) = (time, 0.0);
     }
 
-    /// The length of a step.
+    /// The step length.
     #[must_use]
     pub fn step(&self) -> f64 {
         self.step
     }
 
-    /// What the steps so far have cost.
+    /// The cost of all steps so far.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
         self.memory.statistics()
     }
 
-    /// Moves `state` over one element, in pieces where the whole of it fails (with an allocator in the program, though it is not used).
+    /// Moves `state` over one element, in pieces where the whole step fails (only in programs with an allocator,
+    /// although it is not used).
     ///
     /// # Errors
     /// [`StepError`]; `state` is unchanged then.
@@ -129,7 +133,7 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
         Ok(())
     }
 
-    /// All points at once, where that is possible.
+    /// A step with all points at once, where that is possible.
     #[inline(always)]
     fn together<M, const P: usize, const U: usize>(
         &mut self,
@@ -148,7 +152,7 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
         }
     }
 
-    /// What is left of a step that has not been done with all points at once. Not written into the places of its call: it is long, and seldom needed.
+    /// The rest of a step that could not be made with all points at once. Not inlined: it is long and rarely needed.
     #[cfg_attr(feature = "alloc", inline(never))]
     fn otherwise<M, const P: usize, const U: usize>(
         &mut self,
@@ -174,7 +178,7 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
     }
 }
 
-/// Steps with what an engine does not own.
+/// A step, with the model and the tables that the engine does not own.
 struct Run<'a, M, E, const P: usize, const U: usize> {
     engine: &'a mut E,
     model: &'a M,
@@ -208,7 +212,7 @@ impl<
         self.continued(together, (t, h), state)
     }
 
-    /// Nobody asks for the inside of a step.
+    /// Dense output is not available here.
     fn passed(&mut self, _: f64, _: f64, _: [Infallible; 0]) {}
 }
 
@@ -222,7 +226,7 @@ impl<
     const PIVOTS: usize,
 > Run<'_, M, Specialised<N, S, NUMBERS, PIVOTS>, P, U>
 {
-    /// What becomes of a step that has been tried with all points at once.
+    /// Continues a step that has been tried with all points at once.
     #[inline]
     fn continued(
         &mut self,
@@ -238,14 +242,14 @@ impl<
         if const { S::GROUPS > 0 }
             && let Some(points) = &mut self.engine.points
         {
-            // An ordinary step continues what is in its workspace.
+            // An ordinary step continues from what is in its workspace.
             points.write_back::<M>(self.scheme, &mut self.engine.numbers);
             points.forget();
         }
         self.ordinary(place, state)
     }
 
-    /// One point after the other. Not written into the places of its call, of which there are two.
+    /// Evaluates one point after the other. Not inlined: it is called from two places.
     #[cfg_attr(feature = "alloc", inline(never))]
     fn ordinary(&mut self, place: (f64, f64), state: &mut State<N>) -> Result<(), StepError> {
         let engine = &mut *self.engine;

@@ -1,4 +1,4 @@
-//! What a run cost.
+//! The cost of a run, in counts of evaluations and iterations.
 
 use core::fmt;
 
@@ -7,31 +7,34 @@ use core::fmt;
 pub struct Statistics {
     /// Accepted steps.
     pub steps: u64,
-    /// Iterations of either kind.
+    /// Iterations of both kinds.
     pub iterations: u64,
-    /// Iterations of the fixed-point kind.
+    /// Fixed-point iterations.
     pub fixed_point_iterations: u64,
-    /// Iterations of Newton's kind.
+    /// Iterations of Newton's method.
     pub newton_iterations: u64,
     /// Calls of the kernel of first derivatives (with or without the mass matrix).
     pub residual_evaluations: u64,
     /// Calls of the kernel of second derivatives.
     pub tangent_evaluations: u64,
-    /// Factorisations of the tangent of an element.
+    /// LU factorisations of the tangent of an element.
     pub factorizations: u64,
-    /// Steps at which the fixed-point iteration was given up for Newton's.
+    /// Steps in which the fixed-point iteration was given up for Newton's method.
     pub fallbacks: u64,
-    /// Steps that were cut into pieces, because Newton's method did not prove the root of the whole step to be the one that continues the motion.
+    /// Steps that were cut into pieces, because Newton's method did not prove that the root of the whole step is the
+    /// one that continues the motion.
     pub cuts: u64,
-    /// Crossings of a kink or a jump of a force at which a step was cut: sign changes of what an `abs`, `sign`, `min`, `max` or `select` chooses by.
+    /// Crossings of a kink or a jump of a force at which a step was cut: sign changes of the argument by which an
+    /// `abs`, `sign`, `min`, `max` or `select` chooses.
     pub kinks: u64,
-    /// Steps of a linear model by one product with its matrix.
+    /// Steps of a linear model that were made by one product with its propagator.
     pub products: u64,
-    /// By how much the fixed-point iteration contracted when it was last judged.
+    /// The contraction ratio of the fixed-point iteration when it was last measured.
     pub contraction: Contraction,
 }
 
-/// The ratio of two successive increments, to seven digits. Kept as the bits of a number that is not negative, which are in the order of the numbers.
+/// The ratio of two successive increments, to seven digits. It is kept as the bits of a non-negative number, which have
+/// the same order as the numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Contraction(u32);
 
@@ -39,7 +42,7 @@ impl Contraction {
     /// Nothing measured.
     pub const NONE: Self = Self(0);
 
-    /// Of a ratio; what is no number counts as no contraction.
+    /// From a ratio; a NaN counts as no contraction.
     pub(crate) fn of(ratio: f64) -> Self {
         #[allow(clippy::cast_possible_truncation, reason = "seven digits do")]
         Self((ratio as f32).to_bits())
@@ -57,23 +60,25 @@ impl Contraction {
     }
 }
 
-/// Why the equations were solved as they were: what [`Solve::Auto`](crate::Solve::Auto) found. `Display` says it in a sentence.
+/// How the equations were solved, and why: what [`Solve::Auto`](crate::Solve::Auto) chose. `Display` writes a sentence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// No step was done.
+    /// No step was made.
     None,
-    /// The fixed point contracted in all steps.
+    /// The fixed-point iteration contracted in all steps.
     FixedPoint,
-    /// The fixed point was given up in some steps, and Newton's method took over for those that followed.
+    /// The fixed-point iteration was given up in some steps, and Newton's method was used for these and some that
+    /// followed.
     Both,
-    /// The equations are linear, or Newton's method was asked for, or the form at hand has no other.
+    /// Newton's method only: the equations are linear, or it was requested, or the form of the equations has no
+    /// fixed-point iteration.
     Newton,
-    /// A linear model: one product with a matrix a step.
+    /// A linear model: one product with a matrix for each step.
     Product,
 }
 
 impl Statistics {
-    /// Nothing done.
+    /// All counts zero.
     pub const NONE: Self = Self {
         steps: 0,
         iterations: 0,
@@ -105,7 +110,7 @@ impl Statistics {
         self.contraction = self.contraction.max(other.contraction);
     }
 
-    /// What came after others that are part of these counts.
+    /// The counts that were added since `before`, which is an earlier state of these counts.
     #[must_use]
     pub fn since(&self, before: &Self) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! Steps: one element after the other, on memory of the caller or on its own.
+//! Steps over one element after the other, on memory of the caller or of the stepper.
 
 use crate::equations::{Equations, Span};
 use crate::error::StepError;
@@ -68,7 +68,7 @@ where
             damping: 0.0,
         };
         let known = memory.factored == Some(h);
-        // A failure leaves nothing to continue from.
+        // After a failure there is no polynomial to continue from.
         memory.last = None;
         let mut driver = Driver {
             control: &self.control,
@@ -130,7 +130,7 @@ where
         if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
             return Err(StepError::NonFinite);
         }
-        // A fixed point that contracts has proven enough, and a step of it is not to cost more.
+        // A contracting fixed-point iteration is proof enough, and such a step is to have no additional cost.
         if let Some(evidence) = &driver.evidence
             && !M::FACTS.linear
         {
@@ -156,7 +156,7 @@ where
         Ok(())
     }
 
-    /// Sets the unknowns to where the iteration starts; true if that continues the last step.
+    /// Sets the initial guess of the unknowns; true if it continues the last step.
     pub(crate) fn prepare<const N: usize>(
         &self,
         memory: &mut Memory<N>,
@@ -209,7 +209,7 @@ where
     }
 }
 
-/// Chooses between the iterations and between their starts.
+/// Chooses between the iterations and between their initial guesses.
 struct Driver<'a> {
     control: &'a Control,
     origin: &'a mut [f64],
@@ -217,9 +217,9 @@ struct Driver<'a> {
     known: bool,
     linear: bool,
     preference: &'a mut Preference,
-    /// Whether the tangent holds factors that may serve the next step.
+    /// Whether the tangent holds LU factors that may serve the next step.
     has_factors: bool,
-    /// What Newton's method has to say for its root.
+    /// The evidence that Newton's method gives for its root.
     evidence: Option<Evidence>,
 }
 
@@ -272,7 +272,7 @@ impl Driver<'_> {
             Ok(evidence) if !self.warm || proves(&evidence) => evidence,
             Err(error) if !self.warm => return Err(error),
             Ok(_) | Err(_) => {
-                // The continued polynomial may be a worse start than none.
+                // The extrapolated polynomial may be a worse initial guess than a cold start.
                 cold(scratch.unknowns);
                 newton(
                     equations,

@@ -1,9 +1,9 @@
-//! What the macro found out about a model, to be read by people and programs.
+//! The structure of a model as the macro has determined it, for people and programs.
 
 use crate::model::{Facts, Form};
 use core::fmt;
 
-/// Operations of one kernel at one instant.
+/// The number of operations of one kernel at one instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Operations {
     /// Additions and subtractions.
@@ -12,14 +12,14 @@ pub struct Operations {
     pub multiplications: u32,
     /// Divisions.
     pub divisions: u32,
-    /// Evaluations of a sine, a cosine, or both at once.
+    /// Evaluations of a sine, of a cosine, or of both at once.
     pub sines: u32,
-    /// Evaluations of other functions, powers and square roots among them.
+    /// Evaluations of other functions, including powers and square roots.
     pub functions: u32,
 }
 
 impl Operations {
-    /// None at all.
+    /// No operations.
     pub const NONE: Self = Self {
         additions: 0,
         multiplications: 0,
@@ -36,13 +36,14 @@ pub struct Structure {
     pub name: &'static str,
     /// Lagrangian or Hamiltonian.
     pub form: Form,
-    /// Linear? separable? smooth? autonomous? constant mass matrix?
+    /// Whether the model is linear, separable, smooth or autonomous, and whether its mass matrix is constant.
     pub facts: Facts,
-    /// The coordinates that do not appear in the energy function: their momenta change by forces alone.
+    /// The cyclic coordinates, which do not appear in the energy function: their momenta change only by forces.
     pub cyclic: &'static [&'static str],
-    /// Those of them on which no force acts: their momenta are constant, and `model(Name, routh(…))` makes a model without them.
+    /// Those of them on which no force acts: their momenta are constant, and `model(Name, routh(…))` makes a model
+    /// without them.
     pub conserved: &'static [&'static str],
-    /// The second derivative by z has nothing off its diagonal: where it is constant as well, no matrix is inverted.
+    /// The second derivative by z is diagonal: where it is constant as well, no matrix is inverted.
     pub diagonal_mass: bool,
     /// The energy function alone. Loops count once for each pass through their body where the length is known, once otherwise.
     pub value: Operations,
@@ -50,12 +51,12 @@ pub struct Structure {
     pub first: Operations,
     /// First and second derivatives together.
     pub second: Operations,
-    /// All of this, and the pattern of the tangent, in words.
+    /// All of this, and the sparsity pattern of the tangent, in words.
     pub page: &'static str,
 }
 
 impl Structure {
-    /// Nothing is known: that of a declaration with mistakes.
+    /// Nothing is known: the structure of a declaration with mistakes.
     pub const UNKNOWN: Self = Self {
         name: "",
         form: Form::Lagrangian,

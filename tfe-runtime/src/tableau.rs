@@ -1,11 +1,11 @@
-//! How the tables of an element are computed: the weak form, solved in twice the precision.
+//! The computation of the tables of an element: the weak form is solved in twice the working precision.
 
 use crate::basis::{MAX_NODES, MAX_RATES, exact_integrals, exact_legendre};
 use crate::double_double::DoubleDouble;
 use crate::element::{Element, Spaces};
 use crate::quadrature::{MAX_POINTS, Quadrature};
 
-/// Where the tables are written to; the same parts as in [`SchemeRef`].
+/// The memory into which the tables are written; the same parts as in [`SchemeRef`].
 pub(crate) struct Target<'a> {
     pub(crate) nodes: &'a mut [f64],
     pub(crate) weights: &'a mut [f64],
@@ -24,12 +24,12 @@ pub(crate) struct Target<'a> {
     pub(crate) force_rate: &'a mut [f64],
 }
 
-/// Values of P_0 … P_{n−1} at a place.
+/// The values of P_0 … P_{n−1} at one place.
 type Values = [DoubleDouble; MAX_NODES];
 const NO_VALUES: Values = [DoubleDouble::ZERO; MAX_NODES];
 
 impl Target<'_> {
-    /// Computes everything; the slices have the lengths that the element asks for.
+    /// Computes all tables; the slices have the lengths that the element requires.
     pub(crate) const fn fill(&mut self, element: Element) {
         let rule = element.quadrature_rule();
         let (k, s) = (element.points(), element.degree());
@@ -48,7 +48,7 @@ impl Target<'_> {
         }
     }
 
-    /// A two-field family: stages from the weak form.
+    /// The tables of a two-field family: the stages follow from the weak form.
     const fn two_field(&mut self, element: Element, rule: &Quadrature) {
         let k = element.points();
         let weak = element.family().spaces(element.degree());
@@ -102,7 +102,7 @@ impl Target<'_> {
         project(rule, element.degree(), self.rate);
     }
 
-    /// A primal element: rates on the Gauss points, compatible coordinates.
+    /// The tables of a primal element: rates at the Gauss points, compatible coordinates.
     const fn primal(&mut self, element: Element, rule: &Quadrature) {
         let (k, s) = (element.points(), element.degree());
         let gauss = Quadrature::gauss(s);
@@ -137,7 +137,7 @@ impl Target<'_> {
                     m += 1;
                 }
                 if collocated {
-                    // The same points: a unit matrix, free of rounding.
+                    // At the same points it is a unit matrix, without rounding errors.
                     value = DoubleDouble::integer(if l == j { 1 } else { 0 });
                 }
                 let weight = rule.exact_weight(l);
@@ -181,7 +181,7 @@ impl Target<'_> {
     }
 }
 
-/// Values at the points of `rule` to the Legendre coefficients of their projection on degree s − 1.
+/// The matrix from values at the points of `rule` to the Legendre coefficients of their projection on degree s − 1.
 ///
 /// Where the rule has s points that is interpolation, since its products are integrated exactly.
 const fn project(rule: &Quadrature, s: usize, matrix: &mut [f64]) {

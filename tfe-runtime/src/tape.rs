@@ -1,12 +1,15 @@
-//! Numbers that write down how they follow from parameters: one kernel call, read backwards, gives the derivatives of a sum of its results by all parameters.
+//! Reverse-mode differentiation: numbers that record their operations on a tape. One kernel call, read backwards, gives
+//! the derivatives of a weighted sum of its results by all parameters.
 //!
-//! Dual numbers give the derivatives of all results by one parameter. What is wanted of an element backwards (T-127) is one number's derivative by all: with weights w of the results r,
+//! Dual numbers give the derivatives of all results by one parameter. The adjoint of an element (T-127) needs the
+//! opposite, the derivatives of one number by all parameters: with weights w of the results r,
 //!
 //! ```text
 //! ∂(w·r)/∂a = Σ over operations from the last to the first: adjoint of an operand += adjoint of the result × ∂result/∂operand .        (T-149)
 //! ```
 //!
-//! Only operations that a parameter has a part in are written down; coordinates, velocities and the time are mere numbers. Some points go side by side, as the operations are the same at all of them.
+//! Only operations that depend on a parameter are recorded; coordinates, velocities and the time are plain numbers.
+//! Several points are evaluated side by side, as the operations are the same at all of them.
 
 use crate::dual::below_one;
 use crate::model::{First, Model};
@@ -17,7 +20,8 @@ use core::cell::RefCell;
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Points side by side. With more, what is written down is more than the fast memory of a processor holds: eight take half as long again.
+/// The number of points side by side. With more, the tape no longer fits into the cache: eight points take half as long
+/// again.
 pub(crate) const LANES: usize = 4;
 
 /// A number for each point.
@@ -25,7 +29,7 @@ pub(crate) type Row = [f64; LANES];
 
 const ZERO: Row = [0.0; LANES];
 
-/// No operand, or a number that no parameter has a part in.
+/// No operand, or one that depends on no parameter.
 const NONE: u32 = u32::MAX;
 
 /// The derivative of an operation by one of its operands.
@@ -36,7 +40,7 @@ enum Slope {
     Of(Row),
 }
 
-/// An operand, and where the derivative by it stands: of sums that is known, and takes no memory.
+/// An operand, and where the derivative by it is stored; for sums the derivative is known and takes no memory.
 #[derive(Clone, Copy, Debug)]
 struct Operand {
     place: u32,
@@ -52,7 +56,7 @@ impl Operand {
     };
 }
 
-/// The operations of one kernel call; parameters have the places before them.
+/// The recorded operations of one kernel call; the parameters occupy the places before them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Operations {
     parameters: usize,
@@ -75,13 +79,13 @@ impl Operations {
     }
 }
 
-/// What kernels are given at points, and the weights of what they give.
+/// The arguments of kernels at several points, and the weights of the results.
 pub(crate) struct Places<const N: usize> {
     count: usize,
     t: Row,
     q: [Row; N],
     z: [Row; N],
-    /// Of the derivatives by z, by q, and of forces.
+    /// The weights of the derivatives by z, of those by q, and of the forces.
     weights: [[Row; N]; 3],
 }
 
@@ -94,14 +98,14 @@ impl<const N: usize> Places<N> {
         weights: [[ZERO; N]; 3],
     };
 
-    /// Whether there is room for no more.
+    /// Whether all lanes are in use.
     pub(crate) fn is_full(&self) -> bool {
         self.count == LANES
     }
 
-    /// One more, where there is room.
+    /// Adds a point, if there is room.
     pub(crate) fn push(&mut self, (t, q, z): (f64, &[f64; N], &[f64; N]), weights: &First<f64, N>) {
-        // Where there are no more points the first one stands, without weights.
+        // Unused lanes repeat the first point with zero weights.
         let lanes = match self.count {
             0 => 0..LANES,
             count => count..count + 1,
@@ -120,16 +124,17 @@ impl<const N: usize> Places<N> {
     }
 }
 
-/// The operations of one kernel call, and what is read of all of them.
+/// The operations of one kernel call, and the accumulated adjoints of all calls.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tape {
     operations: Operations,
-    /// Those of parameters, sums over all calls, and those of operations, zeros between the calls.
+    /// The adjoints of the parameters, summed over all calls, then those of the operations, which are zero between
+    /// calls.
     adjoints: Vec<Row>,
 }
 
 impl Tape {
-    /// Sums of so many parameters, zeros.
+    /// Sets the sums of this many parameters to zero.
     pub(crate) fn begin(&mut self, parameters: usize) {
         let operations = &mut self.operations;
         if operations.parameters != parameters {
@@ -141,17 +146,18 @@ impl Tape {
         self.adjoints[..parameters].fill(ZERO);
     }
 
-    /// How many there are.
+    /// The number of parameters.
     pub(crate) fn parameters(&self) -> usize {
         self.operations.parameters
     }
 
-    /// The sum of a parameter, by its number.
+    /// The sum of a parameter, by its index.
     pub(crate) fn sum(&self, parameter: usize) -> f64 {
         self.adjoints[parameter].iter().sum()
     }
 
-    /// Adds Σ weights · ∂(first derivatives and forces)/∂a over some points to the sum of every parameter a, and leaves none of them.
+    /// Adds Σ weights · ∂(first derivatives and forces)/∂a over the points to the sum of every parameter a, and clears
+    /// the list of points.
     pub(crate) fn take_derivatives<M: Model<N>, const N: usize>(
         &mut self,
         model: &M,
@@ -174,29 +180,29 @@ impl Tape {
         *places = Places::NONE;
     }
 
-    /// A sum, which is zero then.
+    /// Returns a sum and sets it to zero.
     #[cfg(feature = "sparse")]
     pub(crate) fn take(&mut self, place: usize) -> f64 {
         self.take_row(place).iter().sum()
     }
 
-    /// The parts of it, one for each point; zeros then.
+    /// Returns the parts of a sum, one for each point, and sets them to zero.
     pub(crate) fn take_row(&mut self, place: usize) -> Row {
         core::mem::replace(&mut self.adjoints[place], ZERO)
     }
 
-    /// Runs a kernel whose numbers write down their operations.
+    /// Runs a kernel whose numbers record their operations.
     pub(crate) fn record<P>(&mut self, kernel: impl FnOnce(&RefCell<Operations>) -> P) -> P {
         self.operations.list.clear();
         self.operations.slopes.clear();
-        // Numbers share what they write to for as long as the kernel runs.
+        // The numbers share the tape for as long as the kernel runs.
         let operations = RefCell::new(core::mem::take(&mut self.operations));
         let ends = kernel(&operations);
         self.operations = operations.into_inner();
         ends
     }
 
-    /// Reads backwards what was written down, from the places of results with their weights.
+    /// Reads the tape backwards, from the places of the results with their weights.
     pub(crate) fn read<'w>(&mut self, ends: impl Iterator<Item = (u32, &'w Row)>) {
         let operations = &self.operations;
         let count = operations.parameters + operations.list.len();
@@ -214,7 +220,8 @@ impl Tape {
     }
 }
 
-/// From the adjoints of results to those of parameters (T-149); those of operations are zeros then.
+/// Propagates the adjoints of the results to those of the parameters (T-149); the adjoints of the operations are zero
+/// afterwards.
 fn read_backwards(operations: &Operations, adjoints: &mut [Row]) {
     for (place, operation) in operations.list.iter().enumerate().rev() {
         let own = &mut adjoints[operations.parameters + place];
@@ -236,7 +243,8 @@ fn read_backwards(operations: &Operations, adjoints: &mut [Row]) {
     }
 }
 
-/// sum += adjoint · derivative, where an infinite derivative along which nothing changes is none: nothing that is wanted, or nothing that a parameter moves.
+/// sum += adjoint · derivative, where an infinite derivative counts as zero if nothing changes along it: if the adjoint
+/// is zero, or no parameter moves the operand.
 #[inline]
 fn add(sum: &mut Row, adjoint: &Row, derivative: &Row) {
     for lane in 0..LANES {
@@ -246,12 +254,12 @@ fn add(sum: &mut Row, adjoint: &Row, derivative: &Row) {
     }
 }
 
-/// A number for each point, and the place where the operation stands that it comes from.
+/// A number for each point, and the place on the tape of the operation that has made it.
 #[derive(Clone, Copy)]
 pub(crate) struct Taped<'t> {
     value: Row,
     place: u32,
-    /// Where its operation stands; of the time, where those of parameters are to stand.
+    /// The tape, if the number is recorded; the time carries the tape on which parameters are recorded.
     tape: Option<&'t RefCell<Operations>>,
 }
 
@@ -262,7 +270,7 @@ impl fmt::Debug for Taped<'_> {
 }
 
 impl<'t> Taped<'t> {
-    /// The time, where the operations of parameters are to stand.
+    /// The time argument, with the tape on which parameters are recorded.
     #[inline]
     pub(crate) fn time(value: Row, tape: &'t RefCell<Operations>) -> Self {
         Self {
@@ -271,7 +279,7 @@ impl<'t> Taped<'t> {
         }
     }
 
-    /// A number that derivatives are asked by, as if it were the parameter of this place.
+    /// A number by which derivatives are taken, as if it were the parameter at this place.
     pub(crate) fn variable(value: Row, place: usize, tape: &'t RefCell<Operations>) -> Self {
         Self {
             place: place as u32,
@@ -279,12 +287,12 @@ impl<'t> Taped<'t> {
         }
     }
 
-    /// Where its operation stands.
+    /// The place of its operation on the tape.
     pub(crate) fn place(&self) -> u32 {
         self.place
     }
 
-    /// Mere numbers.
+    /// Constants, which are not recorded.
     #[inline]
     pub(crate) fn of(value: Row) -> Self {
         Self {
@@ -294,7 +302,7 @@ impl<'t> Taped<'t> {
         }
     }
 
-    /// y = f(x), with f′ of x and y.
+    /// Records y = f(x), with the derivative f′ as a function of x and y.
     #[inline]
     fn one(self, f: impl Fn(f64) -> f64, slope: impl Fn(f64, f64) -> f64) -> Self {
         let value = self.value.map(f);
@@ -302,7 +310,7 @@ impl<'t> Taped<'t> {
         self.follows(value, || Slope::Of(from_fn(slope)))
     }
 
-    /// The same of values that are known.
+    /// The same with a known value.
     #[inline]
     fn follows(self, value: Row, slope: impl FnOnce() -> Slope) -> Self {
         match self.tape {
@@ -314,7 +322,7 @@ impl<'t> Taped<'t> {
         }
     }
 
-    /// z = f(x, y), with both derivatives of x, y and z.
+    /// Records z = f(x, y), with both derivatives as functions of x, y and z.
     #[inline]
     fn two(
         self,
@@ -330,7 +338,7 @@ impl<'t> Taped<'t> {
         self.follow(other, z, by_self, by_other)
     }
 
-    /// The same of values that are known.
+    /// The same with a known value.
     #[inline]
     fn follow(
         self,
@@ -454,7 +462,7 @@ impl Real for Taped<'_> {
         }
     }
     fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
-        // Inputs are functions of the time, in which no parameter has a part.
+        // Inputs are functions of the time, which does not depend on parameters.
         let value = self.value.map(function);
         self.follows(value, || Slope::Of([f64::NAN; LANES]))
     }
@@ -532,7 +540,7 @@ impl Real for Taped<'_> {
         Self::select(self.less(other), other, self)
     }
     fn hypot(self, other: Self) -> Self {
-        // A length of zero moves along no direction, as that of dual numbers.
+        // A length of zero has slope zero in every direction, as with dual numbers.
         let part = |x: f64, root: f64| if root == 0.0 { 0.0 } else { x / root };
         self.two(
             other,
@@ -550,7 +558,7 @@ impl Real for Taped<'_> {
     }
     fn powf(self, exponent: Self) -> Self {
         let by_base = |x: f64, y: f64, _: f64| y * Real::powf(x, y - 1.0);
-        // Where the power vanishes the logarithm is infinite, and the slope zero.
+        // Where the power vanishes, the logarithm is infinite and the slope zero.
         let by_exponent = |x: f64, _: f64, power: f64| {
             if power == 0.0 {
                 0.0

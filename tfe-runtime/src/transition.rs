@@ -38,7 +38,7 @@ use wanted::{Matrix, Product, Wanted};
 /// returns the end of the step.
 ///
 /// # Errors
-/// [`TransitionError`] if the element is none, the step fails, or `matrix` is shorter than 4N².
+/// [`TransitionError`] if the element is invalid, the step fails, or `matrix` is shorter than 4N².
 #[cfg(feature = "alloc")]
 pub fn of_step<M, const N: usize>(
     model: &M,
@@ -59,11 +59,11 @@ where
     Ok(end)
 }
 
-/// Writes the transition matrix of one step of length h of a linear model without forces of its own, 2N × 2N, row by row, ordered (p, q): it is that of a step at rest at
-/// the origin (T-30), which need not be solved.
+/// Writes the transition matrix of one step of length h of a linear model without forces of its own, 2N × 2N, row by
+/// row, ordered (p, q). It is that of the step at rest at the origin (T-30), which need not be solved.
 ///
 /// # Errors
-/// [`TransitionError`] if the element is none, its tangent is singular, or `matrix` is shorter than 4N².
+/// [`TransitionError`] if the element is invalid, its tangent is singular, or `matrix` is shorter than 4N².
 #[cfg(feature = "alloc")]
 pub fn of_rest<M, const N: usize>(
     model: &M,
@@ -99,7 +99,7 @@ where
     method.transition(&mut memory, workspace, &mut extra, &[], matrix)
 }
 
-/// Refuses sums that are not as many as the columns.
+/// Checks that there is a sum for each column.
 fn check_sums<const N: usize>(
     directions: &[Direction],
     lambda: &[f64],
@@ -166,7 +166,7 @@ where
         self.differentiate(memory, workspace, extra, (impulses, directions), wanted)
     }
 
-    /// The same, and the derivatives of the Legendre coefficients of the element's polynomials.
+    /// The same, with the derivatives of the Legendre coefficients of the element's polynomials.
     #[cfg(feature = "alloc")]
     pub(crate) fn linearise_inside<const N: usize>(
         &self,
@@ -183,8 +183,9 @@ where
         self.differentiate(memory, workspace, extra, given, wanted)
     }
 
-    /// Multiplies that matrix with `lambda`, 2N numbers, from the left: its first 2N columns take the place of `lambda`, the others are added to the g numbers `by_direction`. Without
-    /// constraints it costs one solution with the factors of the tangent, whatever the number of directions.
+    /// Multiplies that matrix by the row `lambda`, 2N numbers, from the left: the result for the first 2N columns
+    /// replaces `lambda`, that for the others is added to the g numbers `by_direction`. Without constraints it costs
+    /// one solve with the transposed LU factors of the tangent, whatever the number of directions.
     ///
     /// # Errors
     /// As [`transition`](Self::transition).
@@ -211,7 +212,7 @@ where
         self.differentiate(memory, workspace, extra, (impulses, directions), wanted)
     }
 
-    /// The same with a loss of the inside of the element.
+    /// The same, with a loss that depends on the inside of the element.
     #[cfg(feature = "alloc")]
     pub(crate) fn adjoint_inside<const N: usize>(
         &self,
@@ -234,7 +235,7 @@ where
         self.differentiate(memory, workspace, extra, given, wanted)
     }
 
-    /// The same by all parameters at once, of a model without constraints.
+    /// The same by all parameters at once, for a model without constraints.
     #[cfg(feature = "alloc")]
     pub(crate) fn adjoint_at_once<const N: usize>(
         &self,
@@ -292,7 +293,7 @@ where
             return Err(TransitionError::MovedImpulse { time });
         }
         set_kicks(&scheme, &interval, parts.kicks);
-        // The factors of a linear model are overwritten with equal ones, but that is not promised.
+        // For a linear model the factors are overwritten by equal ones, but that is not guaranteed.
         memory.forget_factors();
         let kicks: &[[f64; N]] = parts.kicks;
         let span = Span {
@@ -303,7 +304,8 @@ where
             kicks,
             damping: 0.0,
         };
-        // One right side, or solution, for each of the 2N directions of the start, and of the others.
+        // One right-hand side, and later solution, for each of the 2N components of the start and each of the other
+        // directions.
         let m = parts.unknowns.len();
         let (sides, forces) = extra[..needed].split_at_mut(columns * m);
         let mut system = System {
@@ -387,7 +389,7 @@ where
     }
 }
 
-/// Refuses parameters that the model does not have: the derivatives by these would be zeros.
+/// Refuses parameters that the model does not have; their derivatives would be zero.
 fn check_parameters<M, const N: usize>(
     model: &M,
     directions: &[Direction],
@@ -407,7 +409,7 @@ where
     }
 }
 
-/// The time of an impulse whose place τ in the element changes with one of the directions.
+/// The time of an impulse whose place τ in the element changes along one of the directions.
 fn moved_impulse<const N: usize>(
     interval: &Interval<'_, N>,
     directions: &[Direction],

@@ -1,4 +1,4 @@
-//! Sine and cosine of several numbers at once, without branches: the same digits on every processor.
+//! Sine and cosine of several numbers at once, without branches; the digits are the same on every processor.
 //!
 //! ```text
 //! x = n π/2 + y ,   |y| ≤ π/4 ,   sin y and cos y by polynomials, exchanged and negated as n mod 4 says.
@@ -28,7 +28,7 @@ use crate::real::{Real, fused};
 /// The largest argument that is reduced here.
 pub(crate) const LIMIT: f64 = 1e5;
 
-/// Adding it rounds to a whole number, which the last bits of the sum then hold.
+/// Adding this constant rounds a number to an integer, which the last bits of the sum then contain.
 const ROUNDER: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
 
 const TWO_OVER_PI: f64 = core::f64::consts::FRAC_2_PI;
@@ -62,7 +62,7 @@ const PI_1: f64 = core::f64::consts::PI;
 const PI_2: f64 = 1.224_646_799_147_353_2e-16;
 const PI_3: f64 = -2.994_769_809_718_339_7e-33;
 
-/// (sin y − y)/y³ in powers of y² up to π²/4, to 2⁻⁶⁰ but for the rounding of the first.
+/// (sin y − y)/y³ in powers of y² up to π²/4, accurate to 2⁻⁶⁰ except for the rounding of the first coefficient.
 const SIN_TO_HALF_PI: [f64; 8] = [
     -0.166_666_666_666_666_66,
     0.008_333_333_333_333_316,
@@ -78,7 +78,7 @@ const SIN_TO_HALF_PI: [f64; 8] = [
 #[inline]
 pub(crate) fn sin<const W: usize>(x: &[f64; W]) -> [f64; W] {
     if cfg!(not(feature = "simd")) {
-        // What is not fused loses the digits of this reduction.
+        // Without fused operations this reduction loses digits.
         return sin_cos(x).0;
     }
     let mut sin = [0.0; W];
@@ -107,7 +107,7 @@ pub(crate) fn cos<const W: usize>(x: &[f64; W]) -> [f64; W] {
     cos
 }
 
-/// Puts a function of the arguments that are outside of the limits where they are.
+/// Replaces the results for arguments outside the limits by those of another function.
 #[inline(always)]
 pub(crate) fn replace_outside<const W: usize>(
     x: &[f64; W],
@@ -122,7 +122,7 @@ pub(crate) fn replace_outside<const W: usize>(
     }
 }
 
-/// Puts a function of two arguments where one of two numbers is outside of its limits.
+/// The same for a function of two arguments, each with its limits.
 #[inline(always)]
 pub(crate) fn replace_outside_of_two<const W: usize>(
     [(first, (low, high)), (second, (least, most))]: [(&[f64; W], (f64, f64)); 2],
@@ -169,7 +169,7 @@ pub(crate) trait Turn: Real {
     /// sin x and cos x from those of x − n π/2; n is in the last bits of `quadrant`.
     fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self);
 
-    /// Negated where n, in the last bits of `count`, is odd.
+    /// Negates the number where n, in the last bits of `count`, is odd.
     fn negated_if_odd(self, count: Self) -> Self;
 
     /// `self` · `factor` + `term` with one rounding ([`fused`]).
@@ -180,7 +180,7 @@ impl Turn for f64 {
     #[inline(always)]
     fn turned(sin: Self, cos: Self, quadrant: Self) -> (Self, Self) {
         let (sin, cos, quadrant) = (sin.to_bits(), cos.to_bits(), quadrant.to_bits());
-        // All ones where sine and cosine change places.
+        // All bits are one where sine and cosine are exchanged.
         let exchange = 0_u64.wrapping_sub(quadrant & 1);
         let difference = (sin ^ cos) & exchange;
         let sin_sign = (quadrant & 2) << 62;
@@ -230,7 +230,7 @@ fn sin_to_half_pi<R: Turn>(y: R) -> R {
     let z = y * y;
     let z_low = y.fused(y, -z);
     let square = z * z;
-    // The first term is large near π/2: with what rounding takes from it.
+    // The first term is large near π/2 and is added with its rounding error.
     let first = z * y.like(c[0]);
     let first_low = z_low.fused(y.like(c[0]), z.fused(y.like(c[0]), -first));
     let second = square.fused(z.fused(y.like(c[3]), y.like(c[2])), z * y.like(c[1]));
@@ -240,10 +240,11 @@ fn sin_to_half_pi<R: Turn>(y: R) -> R {
     y.fused(first + z.fused(rest, first_low), y)
 }
 
-/// x − n π/2, what rounding takes from it, and n in the last bits of a number.
+/// y = x − n π/2, its rounding error, and n in the last bits of a number.
 #[inline(always)]
 fn remainder<R: Turn>(x: R) -> (R, R, R) {
-    // Written out: closures would be compiled for the instruction set of the crate, not for that of the place of the call.
+    // Written without closures, which would be compiled for the instruction set of the crate and not for that of the
+    // caller.
     let shifted = x.fused(x.like(TWO_OVER_PI), x.like(ROUNDER));
     let n = shifted - x.like(ROUNDER);
     if cfg!(feature = "simd") {
@@ -272,7 +273,7 @@ fn remainder<R: Turn>(x: R) -> (R, R, R) {
 pub(crate) fn reduced<R: Turn>(x: R) -> (R, R) {
     let (y, low, shifted) = remainder(x);
 
-    // Polynomials by halves (Estrin), so that no chain of operations is long.
+    // The polynomials are evaluated by Estrin's scheme, so that the chains of dependent operations are short.
     let z = y * y;
     let (square, cube) = (z * z, z * y);
     let upper = square.fused(x.like(SIN[5]), z.fused(x.like(SIN[4]), x.like(SIN[3])));

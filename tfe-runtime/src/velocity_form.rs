@@ -1,11 +1,11 @@
-//! The element equations with velocities as unknowns: three fields, no mass matrix inverted.
+//! The element equations in velocity form (three fields), with velocities as unknowns; no mass matrix is inverted.
 //!
 //! ```text
 //! r_i = Σ_l P_il L_v,l − p₀ − h Σ_l G_il (L_q + Q)_l − Σ ω_i(τ*) J = 0
 //! ```
 //!
-//! with v_l = Σ_j E_lj ν_j and q_l = q₀ + h Σ_j C_lj ν_j. Every element runs a Lagrangian like this;
-//! a Hamiltonian model runs it through the pointwise Legendre transform.
+//! with v_l = Σ_j E_lj ν_j and q_l = q₀ + h Σ_j C_lj ν_j. Every element solves a Lagrangian in this form, and a
+//! Hamiltonian by way of the pointwise Legendre transform where it has no phase-space form.
 
 use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::{LegendreError, StepError};
@@ -23,7 +23,7 @@ pub(crate) struct VelocityForm<'a, M, const N: usize> {
     pub(crate) momenta: &'a mut [[f64; N]],
     pub(crate) masses: &'a mut [f64],
     pub(crate) mass_pivots: &'a mut [usize],
-    /// The one mass matrix of a model that has only one.
+    /// The LU factors of the mass matrix, where it is constant.
     pub(crate) constant_mass: &'a mut Option<Block<N>>,
     pub(crate) statistics: &'a mut Statistics,
 }
@@ -104,7 +104,7 @@ where
         (t + scheme.nodes[l] * h, q, v)
     }
 
-    /// Fills the residual and the forces, and on demand the mass matrices of the rows.
+    /// Computes the residual and the forces, and on request the mass matrices of the rows.
     fn evaluate(&mut self, x: &[f64], r: &mut [f64], with_masses: bool) -> Result<(), StepError> {
         let rates = x.as_chunks::<N>().0;
         let rows = r.as_chunks_mut::<N>().0;
@@ -168,7 +168,7 @@ where
         Ok(())
     }
 
-    /// Takes p₀ and the impulse of forces and kicks from the rows.
+    /// Subtracts p₀ and the impulse of forces and kicks from the rows.
     #[inline(always)]
     pub(crate) fn subtract_impulse(&self, rows: &mut [[f64; N]]) {
         let Span {
@@ -232,7 +232,7 @@ where
         let (t, q, v) = self.place(l, rates);
         let damping = self.span.damping;
         if damping != 0.0 {
-            // Kernels write only what is not structurally zero: nothing of the last call may stay.
+            // Kernels write only structurally non-zero entries: nothing of the last call may remain.
             point.second = Second::ZERO;
         }
         match M::FORM {
@@ -264,7 +264,7 @@ where
         Ok(())
     }
 
-    /// Adds what one point gives to the tangent ∂r/∂ν.
+    /// Adds the contribution of one point to the tangent ∂r/∂ν.
     pub(crate) fn add_to_tangent(&self, l: usize, by: &PointTangent<N>, tangent: &mut [f64]) {
         let points = self.scheme.points();
         let size = self.scheme.unknowns() * N;
@@ -310,7 +310,7 @@ where
         if with_masses {
             self.factor_masses()?;
         }
-        // Σ_l P_il E_li = 1 for every rule that is allowed: a constant mass needs no factor.
+        // Σ_l P_il E_li = 1 for every admissible rule: a constant mass matrix enters without a factor.
         for (i, row) in step.as_chunks_mut::<N>().0.iter_mut().enumerate() {
             match self.constant_mass {
                 Some(mass) => mass.solve(row),
@@ -362,8 +362,8 @@ where
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
         let position = relative(self.span.h, &self.span.start.q, x, step);
-        // The momentum at the end is as good as the velocities, whatever the step; what is left of
-        // an increment reaches it through forces only, hence the factor.
+        // The momentum at the end is as accurate as the velocities, whatever the step. The rest of an increment affects
+        // it through the forces only, hence the factor.
         let velocity = 0.25 * relative(1.0, &[], x, step);
         let relative = if (velocity + position).is_nan() {
             f64::NAN
@@ -374,7 +374,7 @@ where
     }
 
     fn finish(&mut self, x: &[f64], scratch: &mut [f64]) -> Result<(), StepError> {
-        // The end needs the forces at the final velocities, not at the last but one.
+        // The end depends on the forces at the final velocities, not at the previous ones.
         self.evaluate(x, scratch, false)
     }
 
@@ -383,7 +383,7 @@ where
     }
 }
 
-/// Adds the derivative by all unknown rates of component a of weighted momentum and force at a point.
+/// Adds the derivative, by all unknown rates, of component a of a weighted sum of momentum and force at a point.
 #[inline(always)]
 pub(crate) fn add_row<const N: usize>(
     scheme: &SchemeRef<'_>,
@@ -401,7 +401,7 @@ pub(crate) fn add_row<const N: usize>(
         by_v[b] = force * by.force_v[a][b];
         by_q[b] = force * by.force_q[a][b];
     }
-    // Of a collocation method a row has the momentum of one point only.
+    // In a collocation method, each row contains the momentum of one point only.
     if momentum != 0.0 {
         for b in 0..N {
             by_v[b] += momentum * by.momentum_v[a][b];

@@ -1,9 +1,9 @@
-//! The nodal forms of the paper, for checking and for teaching.
+//! The nodal forms of the paper, for verification and teaching.
 //!
-//! Steps are computed from the tables of [`scheme`](crate::scheme); here the same elements are
-//! written with shape functions, their tangents K and residuals F integrated and their interior
-//! nodes condensed, as in (17)–(38). N are the shape functions of degree n − 1 on the nodes, M those
-//! of degree n − 2 on the trial nodes of the mixed form; a dot is d/dt.
+//! Steps are computed from the tables of [`scheme`](crate::scheme). Here the same elements are written with shape
+//! functions: their tangents K and residuals F are integrated, and their interior nodes condensed, as in (17)–(38). N
+//! are the shape functions of degree n − 1 on the nodes, M those of degree n − 2 on the trial nodes of the mixed form;
+//! a dot is d/dt.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -23,9 +23,9 @@ use crate::quadrature::Quadrature;
 pub enum WeakFormError {
     /// The model has no value at a point of the rule.
     Legendre(LegendreError),
-    /// A matrix that is to be solved with is singular.
+    /// A matrix of a linear system is singular.
     Singular,
-    /// Nodes, unknowns or blocks of a matrix do not fit together.
+    /// The numbers of nodes, unknowns or blocks of a matrix do not agree.
     Shape,
 }
 
@@ -61,7 +61,7 @@ pub struct Assembled {
 pub struct PrimalForm<'a, M> {
     /// The model.
     pub model: &'a M,
-    /// The rule.
+    /// The quadrature rule.
     pub rule: Quadrature,
     /// The nodes on \[0, 1\], both ends among them.
     pub nodes: Vec<f64>,
@@ -184,7 +184,7 @@ impl<M> PrimalForm<'_, M> {
 pub struct MixedForm<'a, M> {
     /// The model.
     pub model: &'a M,
-    /// The rule.
+    /// The quadrature rule.
     pub rule: Quadrature,
     /// The nodes of the test functions on \[0, 1\], both ends among them.
     pub nodes: Vec<f64>,

@@ -1,4 +1,4 @@
-//! The memory of one element, given by the caller: no allocation while stepping.
+//! The working memory of one element, provided by the caller, so that stepping does not allocate.
 
 use crate::constrained::layout::Layout;
 use crate::constrained::rows::rows_len;
@@ -8,8 +8,8 @@ use crate::model::Form;
 
 /// Scratch space of one element, [`numbers_len`] numbers and [`pivots_len`] indices.
 ///
-/// It carries the unknowns of the last step, from which the next one starts; it belongs to one
-/// [`Memory`](crate::step::Memory) and is not to be changed in between.
+/// It holds the unknowns of the last step, from which the next one starts. It belongs to one
+/// [`Memory`](crate::step::Memory) and must not be changed between steps.
 #[derive(Debug)]
 pub struct Workspace<'a> {
     /// Numbers.
@@ -18,7 +18,7 @@ pub struct Workspace<'a> {
     pub pivots: &'a mut [usize],
 }
 
-/// How many numbers of a rate are unknown at one place: N velocities, or N forces and N velocities.
+/// The number of unknown rates at one place: N velocities, or N forces and N velocities.
 pub(crate) const fn width(element: &Element, form: Form, coordinates: usize) -> usize {
     match form {
         Form::Hamiltonian if element.has_phase_form() => 2 * coordinates,
@@ -26,7 +26,8 @@ pub(crate) const fn width(element: &Element, form: Form, coordinates: usize) -> 
     }
 }
 
-/// How many unknowns an element has inside: rates, and with constraints the velocity at the end and all multipliers.
+/// The number of interior unknowns of an element: rates and, with constraints, the velocity at the end and all
+/// multipliers.
 pub(crate) const fn interior_len(
     element: &Element,
     form: Form,
@@ -40,7 +41,8 @@ pub(crate) const fn interior_len(
     }
 }
 
-/// The numbers that a [`Workspace`] needs for a valid element and a model with so many coordinates and constraints.
+/// The length of [`Workspace::numbers`] for a valid element and a model with these numbers of coordinates and
+/// constraints.
 #[must_use]
 pub const fn numbers_len(
     element: Element,
@@ -50,8 +52,8 @@ pub const fn numbers_len(
 ) -> usize {
     let (k, u) = (element.points(), element.unknowns());
     let m = interior_len(&element, form, coordinates, constraints);
-    // Unknowns, their start, increments; forces and momenta at the points; impulses and mass
-    // matrices of the rows; extrapolation; rows of constraints; tangent.
+    // Unknowns, their initial guess, increments; forces and momenta at the points; impulses and mass matrices of the
+    // rows; extrapolation matrix; rows of constraints; tangent.
     3 * m
         + 2 * k * coordinates
         + u * coordinates * (1 + coordinates)
@@ -60,7 +62,7 @@ pub const fn numbers_len(
         + m * m
 }
 
-/// The indices that a [`Workspace`] needs.
+/// The length of [`Workspace::pivots`].
 #[must_use]
 pub const fn pivots_len(
     element: Element,
@@ -72,7 +74,7 @@ pub const fn pivots_len(
     m + element.unknowns() * coordinates + constraints
 }
 
-/// The numbers that a transition matrix needs beside the workspace.
+/// The additional memory that a transition matrix needs.
 #[must_use]
 pub const fn transition_len(
     element: Element,
@@ -83,7 +85,7 @@ pub const fn transition_len(
     linearised_len(element, form, coordinates, constraints, 0)
 }
 
-/// The same with derivatives by so many directions besides.
+/// The same with derivatives by this number of further directions.
 #[must_use]
 pub const fn linearised_len(
     element: Element,
@@ -93,35 +95,35 @@ pub const fn linearised_len(
     directions: usize,
 ) -> usize {
     let m = interior_len(&element, form, coordinates, constraints);
-    // A side for each direction, and the derivatives of the momentum at the end.
+    // A right-hand side for each direction, and the derivatives of the momentum at the end.
     (2 * coordinates + directions) * m + coordinates * (m + coordinates + directions)
 }
 
-/// The workspace cut into its parts.
+/// The workspace divided into its parts.
 pub(crate) struct Parts<'a, const N: usize> {
     /// The unknown rates: U rows; in phase form U rows of forces, then U rows of velocities.
     pub(crate) unknowns: &'a mut [f64],
-    /// Where the iteration started.
+    /// The initial guess of the iteration.
     pub(crate) origin: &'a mut [f64],
     /// Residual or increment.
     pub(crate) step: &'a mut [f64],
-    /// L_q + Q at the points; in phase form velocities.
+    /// L_q + Q at the points; in phase form the velocities.
     pub(crate) forces: &'a mut [[f64; N]],
-    /// Momenta at the points, those from which the Legendre transform starts.
+    /// The momenta at the points: the initial guesses of the Legendre transform.
     pub(crate) momenta: &'a mut [[f64; N]],
-    /// What impulses add to the rows.
+    /// The contributions of impulses to the rows.
     pub(crate) kicks: &'a mut [[f64; N]],
-    /// Factored mass matrices of the rows; in phase form H_pp at the stages.
+    /// The LU factors of the mass matrices of the rows; in phase form H_pp at the stages.
     pub(crate) masses: &'a mut [f64],
-    /// Old unknowns to new ones; U × U.
+    /// The extrapolation matrix from old to new unknowns; U × U.
     pub(crate) extrapolation: &'a mut [f64],
-    /// Rows of constraints.
+    /// The rows of constraints.
     pub(crate) rows: &'a mut [f64],
-    /// Matrix of Newton's method, or its factors.
+    /// The tangent of Newton's method, or its LU factors.
     pub(crate) tangent: &'a mut [f64],
     pub(crate) tangent_pivots: &'a mut [usize],
     pub(crate) mass_pivots: &'a mut [usize],
-    /// One for each constraint that is independent of those before, else zero.
+    /// One for each constraint that is independent of those before it, zero for the others.
     pub(crate) active: &'a mut [usize],
 }
 
@@ -171,7 +173,7 @@ impl<'a, const N: usize> Parts<'a, N> {
     }
 }
 
-/// What an iteration works on.
+/// The working memory of an iteration.
 pub(crate) struct Scratch<'a> {
     pub(crate) unknowns: &'a mut [f64],
     pub(crate) step: &'a mut [f64],

@@ -1,4 +1,4 @@
-//! What all trajectories share, and the choice of the instruction set.
+//! The engine of a bundle: what all trajectories share, and the choice of the instruction set.
 
 use super::group::{Group, Work};
 use super::step::Step;
@@ -13,7 +13,7 @@ use crate::registers::storage::Heap;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::{Contraction, Statistics};
 
-/// Tables and scratch of steps side by side.
+/// The tables and the working memory of steps side by side.
 #[derive(Clone, Debug)]
 pub(super) struct Engine<const N: usize> {
     tables: Tables<Heap>,
@@ -24,15 +24,15 @@ pub(super) struct Engine<const N: usize> {
     pub(super) registers: Registers,
 }
 
-/// What the processor has for eight numbers.
+/// The registers in which eight numbers are held.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Registers {
-    /// What the compiler makes of arrays.
+    /// Arrays, vectorised by the compiler.
     Any,
-    /// Two of AVX2.
+    /// Two AVX2 registers.
     Two(pulp::x86::V3),
-    /// One of AVX-512.
+    /// One AVX-512 register.
     One(pulp::x86::V4),
 }
 
@@ -70,7 +70,7 @@ impl<T: Together<N>, const N: usize> Job<'_, T, N> {
 }
 
 impl<const N: usize> Engine<N> {
-    /// For an element of no more than 16 points; nothing if a constant mass matrix is singular.
+    /// An engine for an element with at most 16 points; `None` if a constant mass matrix is singular.
     pub(super) fn new<M>(model: &M, table: &SchemeTable) -> Option<Self>
     where
         M: Model<N>,
@@ -92,12 +92,12 @@ impl<const N: usize> Engine<N> {
         })
     }
 
-    /// Says that no trajectory continues the last step.
+    /// Declares that no trajectory continues the last step.
     pub(super) fn forget(&mut self) {
         self.last_step = 0.0;
     }
 
-    /// Moves the wanted lanes from t to t + h and says which of them have arrived; the others are where they were.
+    /// Moves the requested lanes from t to t + h and returns which of them succeeded; the others are unchanged.
     pub(super) fn advance<T>(
         &mut self,
         (models, table, control): (&T, &SchemeTable, &Control),
@@ -113,7 +113,7 @@ impl<const N: usize> Engine<N> {
             self.tables.set_ratio(table, h / self.last_step);
         }
         self.last_step = h;
-        // The slowest one of this step.
+        // The slowest contraction of this step.
         statistics.contraction = Contraction::NONE;
         self.inertia.set_step(Lanes([0.0; 4]), h);
         let step = Step {

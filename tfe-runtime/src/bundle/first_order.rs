@@ -1,4 +1,4 @@
-//! Equations of first order: velocities are the unknowns, or the rates of phase space.
+//! The iteration for equations of first order: the unknowns are the velocities, or the rates of phase space.
 
 use super::group::{Group, Work, Written};
 use super::judge::{Increments, larger};
@@ -15,7 +15,7 @@ impl<M, const N: usize> Step<'_, M, N>
 where
     M: Model<N>,
 {
-    /// What low words of the start and of the tables add at the points.
+    /// Computes the contributions of the low words (rounding errors) of the start and of the tables at the points.
     #[inline(always)]
     pub(super) fn begin<V: Eight>(
         &self,
@@ -28,7 +28,7 @@ where
         rows.set_low::<_, _, M>(like, &at);
     }
 
-    /// An iteration of a Lagrangian's velocities.
+    /// One iteration for the velocities of a Lagrangian.
     #[inline(always)]
     pub(super) fn sweep_velocity<V: Eight>(
         &self,
@@ -44,14 +44,14 @@ where
         let (changed, size) = (changed.by_lane(), size.by_lane());
         let start = largest(like, &load(like, &group.start.q));
         let position = self.relative(start, size, changed);
-        // The momentum at the end is as good as the velocities, whatever the step; what is left of an increment reaches it through forces
-        // only, hence the factor.
+        // The momentum at the end is as accurate as the velocities, whatever the step. The rest of an increment affects
+        // it through the forces only, hence the factor.
         let velocity = changed / larger(size, like.like(f64::MIN_POSITIVE));
         let velocity = like.like(0.25) * velocity;
         Increments::new(larger(velocity, position), position)
     }
 
-    /// An iteration of a Hamiltonian's rates.
+    /// One iteration for the rates of a Hamiltonian.
     #[inline(always)]
     pub(super) fn sweep_phase<V: Eight>(
         &self,
@@ -75,7 +75,7 @@ where
         Increments::new(relative, position)
     }
 
-    /// Start plus h times the integrals of the rates, of coordinate `a`.
+    /// The start plus h times the integrals of the rates, for coordinate `a`.
     #[inline(always)]
     pub(super) fn end<V: Eight, const EXACT: bool>(
         &self,

@@ -1,4 +1,4 @@
-//! Eight trajectories side by side, and what the iteration of their elements needs.
+//! Eight trajectories side by side, and the working memory of their iteration.
 
 use crate::model::State;
 use crate::registers::pair::{Eight, LANES};
@@ -19,7 +19,7 @@ pub(super) struct Ends<const N: usize> {
 #[derive(Clone, Debug)]
 pub(super) struct Group<const N: usize> {
     pub(super) start: Ends<N>,
-    /// What rounding took from it.
+    /// The rounding error of the state (compensated summation).
     pub(super) low: Ends<N>,
     /// Whether a lane continues its last step.
     pub(super) warm: [bool; LANES],
@@ -29,22 +29,23 @@ pub(super) struct Group<const N: usize> {
     pub(super) rates: Vec<Row<N>>,
 }
 
-/// Scratch of one step.
+/// The working memory of one step.
 #[derive(Clone, Debug)]
 pub(super) struct Work<const N: usize> {
     /// Momenta at the points.
     pub(super) momenta: Vec<Row<N>>,
-    /// Velocities from which coordinates follow in phase space; accelerations at the end in equations of second order.
+    /// The velocities from which coordinates follow in phase space; the accelerations at the end in equations of second
+    /// order.
     pub(super) velocities: Vec<Row<N>>,
-    /// Products with the tables.
+    /// Products of the tables with the unknowns.
     pub(super) products: Vec<Row<N>>,
     pub(super) more_products: Vec<Row<N>>,
-    /// How far velocities at the start reach, in equations of second order.
+    /// The contribution of the velocities at the start, in equations of second order.
     pub(super) drift: Vec<Row<N>>,
-    /// What the low words of state and tables add at the points.
+    /// The contributions of the low words of state and tables at the points.
     pub(super) low_position: Vec<Row<N>>,
     pub(super) low_momentum: Vec<Row<N>>,
-    /// Factors of L_vv, or H_pp, where they are not constant.
+    /// The LU factors of L_vv, or H_pp, where they are not constant.
     pub(super) masses: Vec<[Row<N>; N]>,
     /// Velocities at the start.
     pub(super) velocity: Row<N>,
@@ -88,7 +89,7 @@ impl<const N: usize> Group<N> {
 }
 
 impl<const N: usize> Work<N> {
-    /// For elements of so many points; `varied` if the mass matrix is not constant.
+    /// Memory for elements with this number of points; `varied` if the mass matrix is not constant.
     pub(super) fn new(points: usize, varied: bool) -> Self {
         let rows = || vec![[[0.0; LANES]; N]; points];
         Self {
@@ -106,7 +107,7 @@ impl<const N: usize> Work<N> {
     }
 }
 
-/// The lanes that are written.
+/// A mask of the lanes that are written.
 #[derive(Clone, Copy)]
 pub(super) struct Written<V: Eight> {
     pub(super) mask: V::Mask,
@@ -114,7 +115,7 @@ pub(super) struct Written<V: Eight> {
 }
 
 impl<V: Eight> Written<V> {
-    /// Those whose flag is one; others are zero.
+    /// The lanes whose flag is one; the flags of others are zero.
     #[inline(always)]
     pub(super) fn of(flags: V) -> Self {
         Self {
@@ -123,7 +124,8 @@ impl<V: Eight> Written<V> {
         }
     }
 
-    /// Writes `new` in these lanes. Mostly it is all of them: stores under a mask, which the compiler makes of a choice, take many times as long on some processors.
+    /// Writes `new` in these lanes. Usually all lanes are written, which is tested first: masked stores, into which the
+    /// compiler turns a selection, are many times slower on some processors.
     #[inline(always)]
     pub(super) fn put(self, old: &mut [f64; LANES], new: V) {
         if self.all {

@@ -1,15 +1,16 @@
-//! The stopping rule of single trajectories for several at once, without branches.
+//! The convergence monitor of single trajectories for several lanes at once, without branches.
 
 use crate::evidence::Evidence;
 use crate::newton::{IDLE, MAX_IDLE, ROUGH_ROUND_OFF, ROUND_OFF, Solve, of_fixed_point};
 use crate::real::Real;
 use crate::registers::pair::Eight;
 
-/// Judges the increments of several trajectories as [`Monitor`](crate::newton::Monitor) judges those of one. Truth values are one and zero.
+/// Monitors the increments of several trajectories as [`Monitor`](crate::newton::Monitor) does those of one. Truth
+/// values are the numbers one and zero.
 #[derive(Clone, Copy)]
 pub(super) struct Judge<V> {
     tolerance: V,
-    /// How much the rate before counts.
+    /// The weight of the previous rate.
     memory: V,
     is_first: bool,
     last: V,
@@ -17,7 +18,7 @@ pub(super) struct Judge<V> {
     risen: V,
     best: V,
     idle: V,
-    /// The largest ratio of increments far from round-off: [`Evidence`].
+    /// The largest ratio among increments far above round-off, for [`Evidence`].
     worst: V,
     proven: V,
 }
@@ -26,15 +27,15 @@ pub(super) struct Judge<V> {
 #[derive(Clone, Copy)]
 pub(super) struct Increments<V> {
     relative: V,
-    /// Whether the coordinates move no more.
+    /// Whether the coordinates no longer change.
     settled: V,
 }
 
-/// Coordinates move no more where an increment of them is smaller.
+/// Below this increment, relative to them, the coordinates no longer change.
 const SETTLED: f64 = 4.0 * f64::EPSILON;
 
 impl<V: Real> Increments<V> {
-    /// From those relative to the state, and those of the coordinates alone.
+    /// From the increments relative to the state, and those of the coordinates alone.
     #[inline(always)]
     pub(super) fn new(relative: V, position: V) -> Self {
         let (zero, one) = (relative.like(0.0), relative.like(1.0));
@@ -45,8 +46,8 @@ impl<V: Real> Increments<V> {
         }
     }
 
-    /// The larger one of two quotients, of which the numerator of the second one is `factor` times that of the first one. Only that quotient is
-    /// computed. Zero over zero is zero, NaN stays NaN.
+    /// The larger of two quotients, where the numerator of the second is `factor` times that of the first. Only the
+    /// larger quotient is computed. 0/0 is zero, and NaN stays NaN.
     #[inline(always)]
     pub(super) fn larger_quotient(velocity: (V, V), position: (V, V), factor: V) -> Self {
         let (zero, one) = (factor.like(0.0), factor.like(1.0));
@@ -84,13 +85,14 @@ impl<V: Eight> Judge<V> {
         }
     }
 
-    /// By how much the last increments were smaller than those before.
+    /// The ratios of the last increments to those before.
     #[inline(always)]
     pub(super) fn rates(&self) -> V {
         self.rate
     }
 
-    /// Which of the `active` lanes have converged, and which go on; those in neither have lost their numbers.
+    /// Which of the `active` lanes have converged, and which continue; lanes in neither set have values that are not
+    /// finite.
     #[inline(always)]
     pub(super) fn judge(&mut self, increments: Increments<V>, active: V) -> (V, V) {
         let is_ordinary = !self.extraordinary(increments, active).any_positive();
@@ -108,8 +110,8 @@ impl<V: Eight> Judge<V> {
         (zero, active)
     }
 
-    /// Zero where a lane is not active, or where its increment is not the last one and falls as most do, or is the first one: nothing but rates is to be found there, in a
-    /// tenth of the operations.
+    /// Zero where a lane is inactive, and where its increment is an ordinary one: neither the first nor the last, and
+    /// decreasing. If all lanes are so, only the rates need to be computed, in a tenth of the operations.
     #[inline(always)]
     fn extraordinary(&self, increments: Increments<V>, active: V) -> V {
         let (size, zero) = (increments.relative, active.like(0.0));
@@ -122,21 +124,21 @@ impl<V: Eight> Judge<V> {
         V::select(size.less(size.like(0.5) * self.best), far, active)
     }
 
-    /// Remembers the largest rates that tell something of the root.
+    /// Records the largest rates that are evidence about the root.
     #[inline(always)]
     fn see_rate(&mut self, size: V, rate: V) {
         let seen = V::select(size.like(Evidence::FAR).less(size), rate, size.like(0.0));
         self.worst = V::select(self.worst.less(seen), seen, self.worst);
     }
 
-    /// The same for increments of any kind.
+    /// The same for all kinds of increments.
     #[inline(always)]
     fn judge_all(&mut self, increments: Increments<V>, active: V) -> (V, V) {
         let size = increments.relative;
         let (zero, one, infinity) = (size.like(0.0), size.like(1.0), size.like(f64::INFINITY));
         let is_first = infinity.less_or_equal(self.last);
         let rate = V::select(size.less_or_equal(zero), zero, size / self.last);
-        // The rest of a geometric series, with a memory of the rate before.
+        // The rest of a geometric series, with a memory of the previous rate.
         let memory = self.memory * self.rate;
         let by_rate = size * size - self.tolerance * (self.last - size);
         let by_memory = size * memory - self.tolerance * (one - memory);
@@ -159,7 +161,7 @@ impl<V: Eight> Judge<V> {
         (proven, V::select(is_stuck, zero, finite - done))
     }
 
-    /// Which are at round-off and no longer fall.
+    /// The lanes whose increments are at round-off and no longer decrease.
     #[inline(always)]
     fn stalled(&self, increments: Increments<V>) -> V {
         let size = increments.relative;
@@ -173,12 +175,12 @@ impl<V: Eight> Judge<V> {
         risen + (often + V::select(idle, settled, zero))
     }
 
-    /// Which of the `active` lanes so many more iterations might serve, at their present rates.
+    /// The `active` lanes that may converge within the remaining iterations at their present rates.
     #[inline(always)]
     pub(super) fn hopeful(&self, active: V, remaining: u32) -> V {
         let (rate, zero) = (self.rate, active.like(0.0));
         if remaining >= 8 {
-            // Most steps: the eighth power is less than half of the smallest target.
+            // The case of most steps: the eighth power is less than half of the smallest target.
             let slow = V::select(rate.less(rate.like(0.05)), zero, active);
             let far = V::select(self.last.less_or_equal(rate.like(1e-4)), slow, active);
             if !far.any_positive() {
@@ -187,14 +189,15 @@ impl<V: Eight> Judge<V> {
         }
         let target = larger(self.tolerance, active.like(64.0 * f64::EPSILON));
         let exponent = i32::try_from(remaining).unwrap_or(i32::MAX);
-        // It falls all the way, or it never does. A loop with an exit would cost more: where it ends, nobody can foresee.
+        // Either the power falls below the target or it never does. A loop with an exit would cost more, because its
+        // end cannot be predicted.
         let projected = self.last * rate.powi(exponent);
         let hopeful = V::select(projected.less_or_equal(target), active, zero);
         V::select(self.last.less_or_equal(target), active, hopeful)
     }
 }
 
-/// The larger one; of numbers that are no NaN.
+/// The larger of two numbers, neither of which is NaN.
 #[inline(always)]
 pub(super) fn larger<V: Real>(x: V, y: V) -> V {
     V::select(x.less(y), y, x)

@@ -1,11 +1,11 @@
-//! Products of the tables with numbers of eight trajectories.
+//! Products of the tables with values of eight trajectories.
 
 use super::group::Row;
 use crate::precise::{add_exactly, exact_term};
 use crate::registers::pair::{Apart, Eight};
 use crate::registers::storage::{Heap, Matrix, Weights};
 
-/// The product of a K × K matrix with a vector over the points, for every coordinate that is wanted.
+/// The product of a K × K matrix with a vector over the points, for every coordinate that is requested.
 #[inline(always)]
 pub(super) fn apply<V: Eight, const N: usize>(
     like: V,
@@ -22,7 +22,7 @@ pub(super) fn apply<V: Eight, const N: usize>(
     });
 }
 
-/// A product to be computed. No model is part of its type, so that all places of its call share what the compiler makes of it.
+/// A product to be computed. Its type does not depend on the model, so that all callers share the compiled code.
 struct Product<'a, const N: usize> {
     matrix: &'a Matrix<Heap>,
     wanted: &'a [bool; N],
@@ -33,7 +33,7 @@ struct Product<'a, const N: usize> {
 impl<const N: usize> Apart for Product<'_, N> {
     #[inline(always)]
     fn run<V: Eight>(mut self, like: V) {
-        // Small tables are written out, with as many lines at once as their sums fit into registers.
+        // Products with small tables are unrolled, with as many rows at once as their sums fit into registers.
         match self.rows.len() {
             1 => self.lines::<V, 1, 1, 0, 1>(like),
             2 => self.lines::<V, 2, 1, 0, 2>(like),
@@ -63,7 +63,7 @@ impl<const N: usize> Apart for Product<'_, N> {
 }
 
 impl<const N: usize> Product<'_, N> {
-    /// Lines `FROM` and B − 1 that follow, of a table of K points in C groups.
+    /// Row `FROM` and the B − 1 following rows, of a table of K points in C groups.
     #[inline(always)]
     fn lines<V: Eight, const K: usize, const C: usize, const FROM: usize, const B: usize>(
         &mut self,
@@ -99,7 +99,7 @@ impl<const N: usize> Product<'_, N> {
         }
     }
 
-    /// The same of any table.
+    /// The same for a table of any size.
     #[inline(always)]
     fn block<V: Eight, const B: usize>(&mut self, like: V, from: usize) {
         for a in 0..N {
@@ -120,7 +120,7 @@ impl<const N: usize> Product<'_, N> {
     }
 }
 
-/// Σ weight · value over the points of coordinate `a`, and what rounding takes from it, as in [`Weights::sums`].
+/// Σ weight · value over the points of coordinate `a`, and its rounding error, as in [`Weights::sums`].
 #[inline(always)]
 pub(super) fn sum<V: Eight, const N: usize, const EXACT: bool>(
     like: V,

@@ -1,4 +1,4 @@
-//! M q̈ = f(q, q̇): forces are the only unknowns.
+//! The iteration for equations of second order, M q̈ = f(q, q̇): the unknowns are the forces.
 
 use super::group::{Group, Row, Work, Written};
 use super::judge::Increments;
@@ -16,7 +16,7 @@ impl<M, const N: usize> Step<'_, M, N>
 where
     M: Model<N>,
 {
-    /// Velocities at the start, and what they lost by rounding.
+    /// Computes the velocities at the start, and their rounding errors.
     #[inline(always)]
     pub(super) fn begin_second_order<V: Eight>(
         &self,
@@ -48,7 +48,7 @@ where
         self.inertia.times(like, &load(like, forces))
     }
 
-    /// One iteration of the forces, after the products with them.
+    /// One iteration for the forces, after their products with the tables.
     #[inline(always)]
     pub(super) fn sweep_second_order<V: Eight>(
         &self,
@@ -74,7 +74,7 @@ where
         let (changed, size) = (changed.by_lane(), size.by_lane());
         let speed = largest(like, &load(like, &work.velocity));
         let distance = largest(like, &load(like, &group.start.q));
-        // Relative changes of velocity and position.
+        // The relative changes of velocity and position.
         let length = like.like(self.h.abs());
         let half = like.like(0.5) * length;
         let velocity = (length * changed, speed.larger(length * size));
@@ -85,7 +85,8 @@ where
         Increments::larger_quotient(velocity, position, half)
     }
 
-    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) of coordinate `a`; [`prepare_end`](Self::prepare_end) goes before.
+    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) for coordinate `a`; [`prepare_end`](Self::prepare_end)
+    /// has to be called first.
     #[inline(always)]
     pub(super) fn end_second_order<V: Eight, const EXACT: bool>(
         &self,
@@ -116,7 +117,7 @@ where
         )
     }
 
-    /// Accelerations at the end of the iteration, where each follows from several forces.
+    /// Computes the accelerations at the end of the iteration, where each depends on several forces.
     #[inline(always)]
     pub(super) fn prepare_end<V: Eight>(&self, like: V, group: &Group<N>, work: &mut Work<N>) {
         if self.inertia.is_diagonal() {

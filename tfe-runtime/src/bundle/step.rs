@@ -1,4 +1,4 @@
-//! A step of eight trajectories: start of the iteration, the iteration, the end.
+//! One step of eight trajectories: initial guess, iteration, end.
 
 use super::group::{Group, Row, Work, Written, flags};
 use super::judge::{Increments, Judge, larger};
@@ -15,7 +15,7 @@ use crate::registers::storage::Heap;
 use crate::statistics::{Contraction, Statistics};
 use alloc::vec::Vec;
 
-/// What is the same for all trajectories.
+/// What is common to all trajectories.
 pub(super) struct Step<'a, M, const N: usize> {
     pub(super) model: &'a M,
     pub(super) tables: &'a Tables<Heap>,
@@ -25,15 +25,16 @@ pub(super) struct Step<'a, M, const N: usize> {
     pub(super) h: f64,
 }
 
-/// After these iterations mass matrices are evaluated anew. The start is good to a few digits, so that one evaluation mostly serves; that
-/// they do not depend on how the iteration goes keeps lanes independent of one another.
+/// The iterations after which mass matrices are evaluated anew. The initial guess is accurate to a few digits, so that
+/// one evaluation usually suffices. The schedule does not depend on the progress of the iteration, which keeps lanes
+/// independent of one another.
 const REFRESHED: [u32; 4] = [0, 4, 8, 14];
 
 impl<M, const N: usize> Step<'_, M, N>
 where
     M: Model<N>,
 {
-    /// Moves the wanted lanes from t to t + h and says which of them have arrived; the others are where they were.
+    /// Moves the requested lanes from t to t + h and returns which of them succeeded; the others are unchanged.
     #[inline(always)]
     pub(super) fn advance<V: Eight>(
         &self,
@@ -62,7 +63,7 @@ where
             } else {
                 self.end_of::<V, true>(like, group, work, a)
             };
-            // Zero times what is not finite is a NaN.
+            // Zero times a number that is not finite is NaN.
             let nothing = zero * (ends[a].0).0 + zero * (ends[a].1).0;
             arrived = V::select(nothing.less_or_equal(zero), arrived, zero);
         }
@@ -84,7 +85,7 @@ where
         }
     }
 
-    /// Coordinate and momentum at the end.
+    /// The coordinate and the momentum at the end.
     #[inline(always)]
     fn end_of<V: Eight, const EXACT: bool>(
         &self,
@@ -100,7 +101,7 @@ where
         }
     }
 
-    /// Sets the unknowns of lanes that continue a step to the polynomial of that, continued.
+    /// Sets the unknowns of lanes that continue a step by extrapolating the polynomial of that step.
     #[inline(always)]
     fn continue_last<V: Eight>(&self, like: V, group: &mut Group<N>, work: &mut Work<N>) {
         if group.warm == [false; LANES] {
@@ -114,7 +115,7 @@ where
         }
     }
 
-    /// The same of one kind of unknowns.
+    /// The same for one kind of unknowns.
     #[inline(always)]
     fn continue_one<V: Eight>(
         &self,
@@ -142,7 +143,7 @@ where
         }
     }
 
-    /// The fixed-point iteration: one for each lane that has converged.
+    /// The fixed-point iteration; the result has a one for each lane that has converged.
     #[inline(always)]
     fn iterate<V: Eight>(
         &self,
@@ -152,7 +153,7 @@ where
         wanted: V,
         statistics: &mut Statistics,
     ) -> V {
-        // Where Newton's method may follow, the iteration gives up early.
+        // Where Newton's method can take over, the iteration gives up early.
         let yielding = self.control.solve != Solve::FixedPoint;
         let most = if yielding {
             self.control.max_iterations.min(PATIENCE)
@@ -168,7 +169,7 @@ where
             let increments = self.sweep(like, group, work, written, &mut evaluation, iteration);
             count += active;
             let (done, going) = judge.judge(increments, active);
-            // Lanes that have converged before keep their last rate.
+            // Lanes that converged earlier keep their last rate.
             rates = V::select(written.mask, judge.rates(), rates);
             arrived += done;
             active = going;
@@ -201,7 +202,7 @@ where
         arrived
     }
 
-    /// One iteration of the lanes that are written.
+    /// One iteration of the lanes in `written`.
     #[inline(always)]
     fn sweep<V: Eight>(
         &self,
@@ -212,7 +213,7 @@ where
         at: &mut Evaluation<V, N>,
         iteration: u32,
     ) -> Increments<V> {
-        // Constant conditions, so that of the three iterations one is compiled.
+        // The conditions are constants, so that only one of the three iterations is compiled.
         if const { is_second_order::<M, N>() } {
             return self.sweep_second_order(like, group, work, written, at, iteration);
         }
@@ -224,7 +225,7 @@ where
         }
     }
 
-    /// |h δ| over the larger one of start and |h x|; zero over zero is zero, NaN stays NaN.
+    /// |h δ| divided by the larger of |start| and |h x|; 0/0 is zero, and NaN stays NaN.
     #[inline(always)]
     pub(super) fn relative<V: Eight>(&self, start: V, x: V, step: V) -> V {
         let (h, zero) = (start.like(self.h.abs()), start.like(0.0));
@@ -232,7 +233,7 @@ where
         V::select(step.less_or_equal(zero), zero, quotient)
     }
 
-    /// Constant rates for those of the wanted lanes that continue no step.
+    /// Sets constant rates as initial guess for those of the requested lanes that do not continue a step.
     #[cold]
     pub(super) fn start_cold<T>(&self, models: &T, group: &mut Group<N>, lanes: &[bool])
     where

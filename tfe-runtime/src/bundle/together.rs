@@ -1,27 +1,27 @@
-//! Whose trajectories go side by side.
+//! The two kinds of bundles: one model in all lanes, or a model for each lane.
 
 use crate::model::{Model, State};
 use crate::points::constant_rates;
 use crate::registers::pair::Eight;
 
-/// What eight trajectories side by side compute with.
+/// The kernels, and the scalar type, with which eight trajectories are computed side by side.
 pub trait Together<const N: usize>: Clone {
     /// The kernels of all lanes.
     type Kernels: Model<N>;
-    /// The numbers that they are given.
+    /// The scalar type of their arguments.
     type Number<'a, V: Eight>: Eight
     where
         Self: 'a;
 
     /// The kernels of all lanes.
     fn kernels(&self) -> &Self::Kernels;
-    /// A number that kernels can be given.
+    /// Converts a number to the scalar type of the kernels.
     fn number<V: Eight>(&self, like: V) -> Self::Number<'_, V>;
-    /// Rates of momenta and coordinates of one lane at a start.
+    /// The rates of momenta and coordinates of one lane at a start.
     fn constant_rates(&self, lane: usize, t: f64, start: &State<N>) -> ([f64; N], [f64; N]);
 }
 
-/// Whose trajectories they are.
+/// Gives the model of each lane.
 pub trait Trajectories<'m, M: Model<N>, const N: usize>: Together<N> {
     /// The model of one lane.
     fn model(&self, lane: usize) -> &'m M;
@@ -31,7 +31,7 @@ pub trait Trajectories<'m, M: Model<N>, const N: usize>: Together<N> {
 #[derive(Debug)]
 pub struct One<'m, M>(pub(super) &'m M);
 
-// Not derived: the model is borrowed, it need not be `Clone`.
+// Not derived: the model is borrowed and need not be `Clone`.
 impl<M> Clone for One<'_, M> {
     fn clone(&self) -> Self {
         *self

@@ -1,4 +1,4 @@
-//! How trajectories lie side by side.
+//! The arrangement of trajectories side by side, for the iterations of `points`.
 
 use super::group::{Ends, Group, Row, Work, Written};
 use super::products::apply;
@@ -12,7 +12,7 @@ use crate::points::sweep::Largest;
 use crate::registers::pair::{Eight, LANES};
 use crate::registers::storage::{Fixed, Heap, Matrix};
 
-/// Eight trajectories, of which some are written.
+/// Eight trajectories, some of which are written.
 pub(super) struct Trajectories<'a, M, V: Eight, const N: usize> {
     step: &'a Step<'a, M, N>,
     start: &'a Ends<N>,
@@ -118,7 +118,7 @@ impl<M, const N: usize> Step<'_, M, N> {
         }
     }
 
-    /// The trajectories as they lie, and their rows of equations of first order.
+    /// The arrangement, and its rows for equations of first order.
     #[inline(always)]
     pub(super) fn rows<'a, V: Eight>(
         &'a self,
@@ -141,7 +141,7 @@ impl<M, const N: usize> Step<'_, M, N> {
         (at, rows)
     }
 
-    /// The trajectories as they lie, and their rows of M q̈ = f.
+    /// The arrangement, and its rows for M q̈ = f.
     #[inline(always)]
     pub(super) fn accelerated<'a, V: Eight>(
         &'a self,

@@ -1,7 +1,7 @@
 //! Models that differ in their parameters, side by side.
 //!
-//! A kernel makes its parameters of the time that it is given ([`Real::parameter`]). Here that number knows eight values of each parameter, so that lane k computes with those of
-//! model k, and the kernel is the one that serves a single model.
+//! A kernel makes its parameters from its time argument ([`Real::parameter`]). Here this number holds eight values of
+//! each parameter, so that lane k computes with those of model k, by the same kernel that serves a single model.
 
 use super::together::{Together, Trajectories};
 use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
@@ -13,7 +13,7 @@ use crate::registers::side::Side;
 use alloc::vec::Vec;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Up to eight models that differ in their parameters only, as one model for steps side by side.
+/// Up to eight models that differ only in their parameters, as one model for steps side by side.
 #[derive(Debug)]
 pub struct Varied<'m, M> {
     models: [&'m M; LANES],
@@ -21,7 +21,7 @@ pub struct Varied<'m, M> {
     parameters: Vec<[f64; LANES]>,
 }
 
-// Not derived: the models are borrowed, they need not be `Clone`.
+// Not derived: the models are borrowed and need not be `Clone`.
 impl<M> Clone for Varied<'_, M> {
     fn clone(&self) -> Self {
         Self {
@@ -32,7 +32,7 @@ impl<M> Clone for Varied<'_, M> {
 }
 
 impl<'m, M> Varied<'m, M> {
-    /// All lanes with the same model.
+    /// The same model in all lanes.
     pub(super) fn new<const N: usize>(model: &'m M) -> Self
     where
         M: Model<N>,
@@ -44,7 +44,8 @@ impl<'m, M> Varied<'m, M> {
         }
     }
 
-    /// Takes these models, one a lane; lanes beyond them stay as they are, and models beyond the eighth are left out.
+    /// Sets the models, one for each lane; lanes without a new model are unchanged, and models beyond the eighth are
+    /// ignored.
     pub(super) fn set<const N: usize>(&mut self, models: &'m [M])
     where
         M: Model<N>,
@@ -88,11 +89,11 @@ impl<'m, M: Model<N>, const N: usize> Trajectories<'m, M, N> for Varied<'m, M> {
     }
 }
 
-/// The kernels of the first model, which take their parameters from the numbers that they are given.
+/// The kernels of the first model, which take their parameters from their time argument.
 impl<M: Model<N>, const N: usize> Model<N> for Varied<'_, M> {
     const FORM: Form = M::FORM;
     const FACTS: Facts = Facts {
-        // Over one run, but not over the lanes.
+        // It is constant during a run, but differs between lanes.
         constant_mass: false,
         ..M::FACTS
     };
@@ -151,7 +152,7 @@ impl<M: Model<N>, const N: usize> Model<N> for Varied<'_, M> {
     }
 }
 
-/// Eight numbers that know the parameters of eight models.
+/// Eight numbers with the parameters of eight models.
 #[derive(Clone, Copy, Debug)]
 pub struct Parametrised<'a, V> {
     value: V,
@@ -187,7 +188,7 @@ impl<V: Eight> Eight for Parametrised<'_, V> {
         self.value.any_positive()
     }
 
-    /// No model is part of what is called like this, so that it needs no parameters.
+    /// The work does not depend on the model, and therefore needs no parameters.
     #[inline(always)]
     fn apart<W: Apart>(self, work: W) {
         self.value.apart(work);
@@ -259,7 +260,7 @@ macro_rules! of_values {
 impl<V: Eight> Real for Parametrised<'_, V> {
     type Mask = V::Mask;
 
-    /// A number without parameters: kernels make theirs by [`like`](Real::like).
+    /// A number without parameters: kernels make their constants by [`like`](Real::like).
     #[inline(always)]
     fn from_f64(value: f64) -> Self {
         Self {

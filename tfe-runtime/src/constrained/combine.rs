@@ -1,4 +1,5 @@
-//! Redundant holonomic constraints in an element: as many combinations of them as are independent (T-118, T-132).
+//! Redundant holonomic constraints in an element: they are replaced by as many combinations as are independent (T-118,
+//! T-132).
 
 use super::rows::{
     COMBINED, Constrains, DEPENDENT, Rows, add_row, dot, has_digits, longest, norm, scaled,
@@ -6,15 +7,19 @@ use super::rows::{
 };
 use crate::legendre::largest;
 
-/// Functions whose gradients vanish in the middle of an element, and turn there by less than this part of what others do, are not combined with these: the weights would be large.
+/// Constraints whose gradients vanish in the middle of an element, and change there by less than this fraction of the
+/// changes of others, are not combined with these: the weights would be large.
 const STILL: f64 = 0.01;
 
 impl<const N: usize> Rows<'_, N> {
-    /// Replaces the rows of holonomic constraints, some of which depend on others, by as many combinations as are independent, functions W φ with W constant in the element
-    /// (T-118): for each gradient that the rows span in the middle of the element, of all combinations with this gradient there the one whose gradient turns least on the
-    /// way. So the others stay independent for as long as can be, and which rows are given, or how they are scaled or combined, makes no difference.
+    /// Replaces the rows of holonomic constraints, some of which depend on others, by as many combinations as are
+    /// independent: functions W φ with W constant in the element (T-118). For each gradient spanned by the rows in the
+    /// middle of the element, it chooses, among all combinations with this gradient there, the one whose gradient
+    /// changes least along the motion. So the rows stay independent for as long as possible, and the result does not
+    /// depend on the choice, scaling or combination of the given rows.
     ///
-    /// `places` are time and position at the start and in the middle, as far as that is known, and `rate` is the velocity there.
+    /// `places` are time and position at the start and, as far as it is known, in the middle; `rate` is the velocity
+    /// there.
     pub(crate) fn combine(
         &mut self,
         model: &dyn Constrains<N>,
@@ -27,7 +32,8 @@ impl<const N: usize> Rows<'_, N> {
         let holonomic = || (0..count).filter(|&c| declared[c].kind.is_holonomic());
         let rank = holonomic().filter(|&c| active[c] != 0).count();
         let [start, (time, middle)] = places;
-        // The middle is known but to the order h², and off the constraints there are more independent rows: which are given would be seen.
+        // The middle is known only to order h², and away from the constraints more rows are independent: without this
+        // correction the result would depend on which rows are given.
         let middle = self.nearest(model, (time, middle), rank);
         let middle = (time, &middle);
         self.evaluate_declared(model, middle.0, middle.1);
@@ -68,9 +74,10 @@ impl<const N: usize> Rows<'_, N> {
         self.start.copy_from_slice(self.rows);
     }
 
-    /// The point of the holonomic constraints, `rank` of which are independent there, that is nearest to a position: q ← q₀ − A⁺ (φ + A (q₀ − q)) (T-151).
+    /// The point on the holonomic constraints nearest to a position, where `rank` of them are independent, by the
+    /// iteration q ← q₀ − A⁺ (φ + A (q₀ − q)) (T-151).
     ///
-    /// The position itself where that leads nowhere.
+    /// If the iteration does not converge, the result is the position itself.
     fn nearest(
         &mut self,
         model: &dyn Constrains<N>,
@@ -86,7 +93,7 @@ impl<const N: usize> Rows<'_, N> {
             for a in 0..N {
                 change[a] -= at[a];
             }
-            // NaN is not near.
+            // A NaN is not near.
             if largest(&change) <= NEAR * largest(&at) {
                 return at;
             }
@@ -103,7 +110,7 @@ impl<const N: usize> Rows<'_, N> {
         rank: usize,
     ) -> [f64; N] {
         self.evaluate_declared(model, t, at);
-        // Rows of length one, and what they are to take away.
+        // The rows are normalised, and the right-hand sides with them.
         for (c, row) in self.rows.iter().enumerate() {
             let length = norm(row);
             if !model.declared()[c].kind.is_holonomic() || length == 0.0 {
@@ -132,9 +139,11 @@ impl<const N: usize> Rows<'_, N> {
         moved
     }
 
-    /// Adds combinations of constraints whose gradients vanish in the middle to those that were chosen, so that the gradients of these turn least.
+    /// Adds combinations of constraints whose gradients vanish in the middle to the chosen ones, so that the gradients
+    /// of these change least.
     ///
-    /// With B the rates of the scaled rows and R = (1 − U Uᵀ) B, the least |(u + v)ᵀ B| over all v ⊥ U, for each column u of U: v in the space of columns of R.
+    /// With B the rates of the scaled rows and R = (1 − U Uᵀ) B, it minimises |(u + v)ᵀ B| over all v ⊥ U for each
+    /// column u of U, with v in the column space of R.
     fn turn_least(
         &mut self,
         model: &dyn Constrains<N>,
@@ -150,7 +159,7 @@ impl<const N: usize> Rows<'_, N> {
         self.psi_q.fill([0.0; N]);
         self.rates.fill([0.0; N]);
         self.mu.fill(0.0);
-        // At rest any direction will do.
+        // At rest any direction is as good as another.
         let is_at_rest = rate.iter().all(|rate| *rate == 0.0);
         let rate = if is_at_rest { &[1.0; N] } else { rate };
         self.differentiate(model, t, q, rate);
@@ -169,7 +178,7 @@ impl<const N: usize> Rows<'_, N> {
         for place in combined() {
             self.take_from_columns(place);
         }
-        // In the places of combinations that are left out: what is added, and by how much that turns.
+        // The places of omitted combinations hold what is added, and how much that changes the gradient.
         let open = || (0..count).filter(|&c| holonomic(c) && active[c] == 0);
         let mut found = 0;
         for place in open() {
@@ -189,7 +198,7 @@ impl<const N: usize> Rows<'_, N> {
         };
         for place in open().take(found) {
             let mut turn = combination(self.weights, place, self.rates);
-            // Twice is enough for orthogonality to rounding.
+            // Two passes of orthogonalisation suffice up to rounding.
             for _ in 0..2 {
                 for before in open().take_while(|&before| before < place) {
                     let part = dot(&turn, &self.psi_q[before]);
@@ -223,12 +232,13 @@ impl<const N: usize> Rows<'_, N> {
         }
     }
 
-    /// Gram–Schmidt on the columns of `spare`: the one that has most of its own becomes a row of the basis. False where none has anything.
+    /// One step of Gram–Schmidt on the columns of `spare`: the column with the largest part orthogonal to the basis
+    /// becomes a row of the basis. False if no column has such a part.
     fn add_basis(&mut self, place: usize) -> bool {
         self.add_column(place, DEPENDENT)
     }
 
-    /// The same where none has more than `least`.
+    /// The same, which returns false if no such part is larger than `least`.
     fn add_column(&mut self, place: usize, least: f64) -> bool {
         let count = self.spare.len();
         let (mut best, mut column) = (least, None);
@@ -247,11 +257,11 @@ impl<const N: usize> Rows<'_, N> {
         true
     }
 
-    /// Leaves of the columns of `spare` what is orthogonal to a row of weights.
+    /// Makes the columns of `spare` orthogonal to a row of weights.
     fn take_from_columns(&mut self, place: usize) {
         let count = self.spare.len();
         let direction = &self.weights[place * count..(place + 1) * count];
-        // Twice is enough for orthogonality to rounding.
+        // Two passes of orthogonalisation suffice up to rounding.
         for _ in 0..2 {
             for a in 0..N {
                 let part: f64 = (direction.iter().zip(&*self.spare))
@@ -264,7 +274,7 @@ impl<const N: usize> Rows<'_, N> {
         }
     }
 
-    /// Multipliers of the constraints as declared to those of combined rows, one number for each.
+    /// Converts multipliers of the constraints as declared to those of combined rows, one for each.
     pub(crate) fn combine_multipliers(&mut self, multipliers: &mut [f64]) {
         let count = multipliers.len();
         for place in 0..count {
@@ -278,7 +288,7 @@ impl<const N: usize> Rows<'_, N> {
         multipliers.copy_from_slice(self.mu);
     }
 
-    /// Back again.
+    /// The inverse conversion.
     pub(crate) fn declared_multipliers(&mut self, multipliers: &mut [f64]) {
         let count = multipliers.len();
         for c in 0..count {

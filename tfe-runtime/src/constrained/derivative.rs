@@ -1,4 +1,5 @@
-//! The equations of a constrained element, differentiated: by its start, and by what moves or stretches it (T-30).
+//! The linearised equations of an element with constraints: derivatives by its start, and by its time and length
+//! (T-30).
 
 use crate::condense::{Direction, System};
 use crate::constrained::element::{ConstrainedForm, Derivatives};
@@ -18,8 +19,9 @@ use crate::{
 #[cfg(feature = "alloc")]
 use alloc::{vec, vec::Vec};
 
-/// Solves for the interior as a function of the start and of directions, and writes the derivatives of the end, 2N rows with the columns of the
-/// sides, ordered (p, q). With `newton_step` the last column is the Newton step of the interior itself. Gives the sides, solved.
+/// Solves for the interior as a linear function of the start and of the directions, and writes the derivatives of the
+/// end: 2N rows with the columns of the right-hand sides, ordered (p, q). With `newton_step` the last column is the
+/// Newton step of the interior itself. Returns the solved sides.
 pub(crate) fn linearise<'s, M, const N: usize>(
     form: &mut ConstrainedForm<'_, M, N>,
     x: &[f64],
@@ -34,7 +36,7 @@ where
     let layout = form.constraints.layout;
     let size = layout.size();
     let columns = system.sides.len() / size;
-    // The first N columns of the sides serve as memory for the derivatives by the coordinates until they are spread out.
+    // The first N columns of the sides hold the derivatives by the coordinates until they are distributed.
     let (by_start, _) = system.sides.split_at_mut(size * N);
     form.evaluate(
         x,
@@ -92,7 +94,8 @@ where
         }
         ends[(N + a) * columns + N + a] += 1.0;
     }
-    // δp₁ = L_vv δv₁ + L_vq δq₁ + what the directions change at fixed unknowns, where δq₁ of the directions is in the latter already.
+    // δp₁ = L_vv δv₁ + L_vq δq₁ + the direct effect of the directions at fixed unknowns, which already contains δq₁ of
+    // the directions.
     let (momenta, coordinates) = ends.split_at_mut(N * columns);
     for a in 0..N {
         for b in 0..N {
@@ -129,11 +132,12 @@ fn along<M, const N: usize>(
 where
     M: Model<N>,
 {
-    // Assembled problems are solved where there is an allocator.
+    // Assembled problems need an allocator.
     Err(StepError::NonFinite)
 }
 
-/// The derivative of the residual along a direction at fixed unknowns and start, row by row, and that of the momentum at the end.
+/// The derivative of the residual along a direction at fixed unknowns and a fixed start, row by row, and that of the
+/// momentum at the end.
 #[cfg(feature = "alloc")]
 fn along<M, const N: usize>(
     form: &mut ConstrainedForm<'_, M, N>,
@@ -255,7 +259,7 @@ where
     Ok(momentum)
 }
 
-/// A point of the element that moves in time, and in space because the element is stretched.
+/// A point of the element as a dual number: it moves in time, and in space because the element is stretched.
 #[cfg(feature = "alloc")]
 fn moving<const N: usize>(
     direction: &Direction,
@@ -275,7 +279,7 @@ fn moving<const N: usize>(
     (time, duals(q, &slope))
 }
 
-/// The derivatives of L_v and L_q + Q along moving time and coordinates, at constant velocity.
+/// The derivatives of L_v and L_q + Q along moving time and coordinates, at fixed velocities.
 #[cfg(feature = "alloc")]
 pub(crate) fn explicit<M, const N: usize>(
     model: &M,
@@ -326,7 +330,7 @@ where
     Ok((momentum, force))
 }
 
-/// Constraints at a moving point.
+/// The constraints at a moving point.
 #[cfg(feature = "alloc")]
 pub(crate) struct DualRows<const N: usize> {
     rows: Vec<[Dual; N]>,

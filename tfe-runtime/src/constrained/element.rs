@@ -7,8 +7,9 @@
 //! end      L_v(v₁, q₁, t₁) + A₁,Vᵀ ν_V − A₁,Sᵀ ν_S = p*₁ ,   A₁ v₁ + a₁ = 0
 //! ```
 //!
-//! with μ̇_l = Σ_j m_j P_j′(2c_l − 1). The element itself is that of [`VelocityForm`]; constraints only add to momenta and forces at its points.
-//! Holonomic rows that depend on one another are combined ([`Rows::combine`], T-118); velocity rows that depend on others are replaced by μ = 0.
+//! with μ̇_l = Σ_j m_j P_j′(2c_l − 1). The equations without constraints are those of [`VelocityForm`]; constraints
+//! only add to the momenta and forces at its points. Dependent holonomic rows are combined ([`Rows::combine`], T-118);
+//! dependent velocity rows are replaced by μ = 0.
 
 use crate::constrained::layout::Layout;
 use crate::constrained::residual::relative_residual;
@@ -23,28 +24,29 @@ use crate::statistics::Statistics;
 use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm};
 
 pub(crate) struct ConstrainedForm<'a, M, const N: usize> {
-    /// The element; its `momenta` become L_v at the points, its `forces` all forces there.
+    /// The element without constraints; its `momenta` become L_v at the points, its `forces` all forces there.
     pub(crate) inner: VelocityForm<'a, M, N>,
     pub(crate) constraints: ElementConstraints<'a, N>,
-    /// What impulses give to the momentum at the end.
+    /// The contribution of impulses to the momentum at the end.
     pub(crate) impulse: [f64; N],
 }
 
-/// Constraints as they are declared.
+/// The constraints as they are declared.
 pub(super) type Declared = &'static [Constraint];
 
-/// What constraints add to an element, of whichever model: they are given as they are declared, so that a model by itself is compiled with their number.
+/// The contributions of constraints to an element. The constraints are passed as declared, not through the type of the
+/// model, so that this code is compiled once for a number of coordinates.
 pub(crate) struct ElementConstraints<'a, const N: usize> {
     pub(super) scheme: SchemeRef<'a>,
     /// The length of the element.
     pub(super) h: f64,
     pub(crate) layout: Layout,
     pub(crate) rows: Rows<'a, N>,
-    /// One for each constraint that counts.
+    /// One for each constraint that is in use.
     pub(crate) active: &'a [usize],
 }
 
-/// The end of the element, as far as the unknowns say.
+/// The end of the element as it follows from the unknowns.
 pub(crate) struct End<const N: usize> {
     pub(crate) t: f64,
     pub(crate) q: [f64; N],
@@ -53,11 +55,11 @@ pub(crate) struct End<const N: usize> {
     pub(crate) second: Second<f64, N>,
 }
 
-/// Where the derivatives of the residual are written.
+/// The memory for the derivatives of the residual.
 pub(crate) struct Derivatives<'a> {
     /// By the unknowns.
     pub(crate) tangent: &'a mut [f64],
-    /// By the coordinates at the start, N columns; empty where nobody asks.
+    /// By the coordinates at the start, N columns; empty if they are not requested.
     pub(crate) by_start: &'a mut [f64],
 }
 
@@ -75,7 +77,7 @@ pub(crate) fn slopes(node: f64, degree: usize) -> [f64; MAX_RATES] {
 }
 
 impl<const N: usize> ElementConstraints<'_, N> {
-    /// The constraints that count, with their kinds: true for holonomic ones.
+    /// The constraints in use, with their kinds: true for holonomic ones.
     pub(crate) fn active(
         &self,
         declared: Declared,
@@ -90,7 +92,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         self.active(declared).any(|(_, kind)| kind == holonomic)
     }
 
-    /// Sets the multipliers at a point for one kind of constraint, others to zero.
+    /// Sets the multipliers at a point for one kind of constraint, and the others to zero.
     #[inline]
     pub(crate) fn set_mu(
         &mut self,
@@ -114,7 +116,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         }
     }
 
-    /// Sets the multipliers of the node at the end, or those with which the start momentum is changed.
+    /// Sets the multipliers of the node at the end, or those that change the momentum at the start.
     #[inline]
     pub(crate) fn set_node_mu(&mut self, declared: Declared, x: &[f64], at_start: bool) {
         let h = self.h;
@@ -133,7 +135,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         }
     }
 
-    /// The equations of constraints that do not count: their multipliers vanish.
+    /// The equations of constraints that are not in use: their multipliers are zero.
     fn hold_dependent(
         &self,
         x: &[f64],
@@ -196,7 +198,7 @@ where
         (span.t + span.h, q, v)
     }
 
-    /// L_v at the end, and on demand second derivatives.
+    /// L_v at the end, and on request second derivatives.
     pub(crate) fn end(&self, x: &[f64], with_second: bool) -> Result<End<N>, StepError> {
         let (t, q, v) = self.end_place(x);
         let model = self.inner.model;
@@ -223,7 +225,7 @@ where
         Ok(End { t, q, v, p, second })
     }
 
-    /// The state at the end and what rounding took from it.
+    /// The state at the end and its rounding error.
     pub(crate) fn end_state(&self, x: &[f64]) -> Result<(State<N>, State<N>), StepError> {
         let end = self.end(x, false)?;
         let span = &self.inner.span;
@@ -242,7 +244,7 @@ where
         Ok((State { q: end.q, p: end.p }, low))
     }
 
-    /// Whether all constraints hold at the end, those that were left out as dependent too.
+    /// Checks that all constraints hold at the end, including those that were omitted as dependent.
     pub(crate) fn check_end(&mut self, x: &[f64]) -> Result<(), StepError> {
         let (t, q, v) = self.end_place(x);
         self.constraints
@@ -264,7 +266,7 @@ where
         Ok(())
     }
 
-    /// The residual at x, and on demand its derivative.
+    /// The residual at x, and on request its derivative.
     pub(crate) fn evaluate(
         &mut self,
         x: &[f64],
@@ -463,7 +465,7 @@ where
     }
 
     fn finish(&mut self, _: &[f64], _: &mut [f64]) -> Result<(), StepError> {
-        // The end follows from the unknowns alone.
+        // The end is a function of the unknowns alone.
         Ok(())
     }
 

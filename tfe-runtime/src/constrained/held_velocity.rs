@@ -1,4 +1,5 @@
-//! How the velocity of a momentum moves with it where the mass matrix is singular and constraints leave one velocity (T-161).
+//! The derivative of the velocity by the momentum where the mass matrix is singular and the constraints determine the
+//! velocity (T-161).
 
 use super::derivative::DualRows;
 use super::node::{border, is_regular};
@@ -12,15 +13,17 @@ use crate::model::{First, Form, Model};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The linear equations of the velocity at a state, factored:
+/// The linear equations for changes of the velocity at a state, with their LU factors:
 ///
 /// ```text
 /// [ L_vv  Aᵀ ] [ δv ]   [ δp − ∂L_v − ∂(Aᵀ)η ]
 /// [ A     0  ] [ δη ] = [ − ∂(A v + a)        ] ,     L_v(q, v, t) + Aᵀη = p                           (T-161)
 /// ```
 ///
-/// with what time, coordinates and parameters change at a fixed velocity under ∂. A mass matrix counts as singular where a pivot of it is below 1e-10 of its column, and of what was subtracted on the way to it, as [`velocity_of`](super::velocity_of) takes it;
-/// redundant rows are left out. Derivatives of velocities and outputs use it (`Simulation::run_sensitive` of the crate `tfe`).
+/// where ∂ denotes the change by time, coordinates and parameters at a fixed velocity. A mass matrix counts as singular
+/// if a pivot is below 1e-10 of its column, and of the terms subtracted from it, as in
+/// [`velocity_of`](super::velocity_of); redundant rows are omitted. Derivatives of velocities and outputs use it
+/// (`Simulation::run_sensitive` of the crate `tfe`).
 #[derive(Clone, Debug)]
 pub struct HeldVelocity<const N: usize> {
     matrix: Vec<f64>,
@@ -30,7 +33,8 @@ pub struct HeldVelocity<const N: usize> {
 }
 
 impl<const N: usize> HeldVelocity<N> {
-    /// At coordinates q with momenta p and their velocities v of a Lagrangian; `None` where L_vv alone says the velocity of a momentum, and without constraints.
+    /// At coordinates q with momenta p and the velocities v of a Lagrangian; `None` where L_vv alone determines the
+    /// velocity of a momentum, and without constraints.
     ///
     /// # Errors
     /// [`ConstraintError::SingularMass`] where the kinetic energy is singular for motions that the constraints allow.
@@ -99,7 +103,7 @@ impl<const N: usize> HeldVelocity<N> {
         core::array::from_fn(|a| sides[a])
     }
 
-    /// Takes weights of the velocity to those of the momentum, and gives what they weigh of A, row by row, and of a.
+    /// Converts weights of the velocity to those of the momentum, and returns the weights of A, row by row, and of a.
     pub(crate) fn pull(&self, v: &[f64; N], weights: &mut [f64; N]) -> (Vec<[f64; N]>, Vec<f64>) {
         let mut w = weights.to_vec();
         w.resize(N + self.active.len(), 0.0);

@@ -1,4 +1,4 @@
-//! What constraints say at one instant of a motion: reactions, and the gradients that span what they allow.
+//! Constraints at one instant of a motion: their reactions and their gradients.
 
 use crate::constrained::derivative::{DualRows, explicit};
 use crate::constrained::rows::{dot, norm, rows_len, scaled, scaled_norm};
@@ -92,7 +92,7 @@ where
     balance(&gradients, &force, &along, v)
 }
 
-/// The reactions that leave of a force what accelerates.
+/// The reactions that balance a force except for the part that accelerates.
 fn balance<const N: usize>(
     gradients: &Gradients<N>,
     force: &[f64; N],
@@ -128,13 +128,13 @@ fn balance<const N: usize>(
     spread(rows, &chosen, &vector[N..])
 }
 
-/// Lengths whose squares, and products of these, are numbers with all digits.
+/// The range of lengths whose squares, and products of these, neither overflow nor lose digits.
 const ORDINARY: core::ops::Range<f64> = 1e-70..1e70;
 
-/// Rows whose lengths differ by no more have products that lose nothing beside one another.
+/// Products of rows whose lengths differ by at most this factor lose no digits beside one another.
 const ALIKE: f64 = 1e6;
 
-/// The multipliers of all rows with the least Σ λ² that give the same Aᵀλ as those of the independent ones.
+/// The multipliers of all rows with the least Σ λ² that give the same Aᵀλ as those of the independent rows.
 fn spread<const N: usize>(
     rows: &[[f64; N]],
     chosen: &[usize],
@@ -144,7 +144,7 @@ fn spread<const N: usize>(
     if rank == rows.len() {
         return Ok(multipliers.to_vec());
     }
-    // Rows over their lengths where products of these are no numbers, or stand beside much larger ones; else over one.
+    // Rows are divided by their lengths if products of these would overflow, lose digits, or stand beside much larger ones; else by one.
     let mut lengths: Vec<f64> = rows.iter().map(norm).collect();
     let (mut shortest, mut longest) = (f64::INFINITY, 0.0_f64);
     for length in lengths.iter().filter(|length| **length != 0.0) {

@@ -1,13 +1,14 @@
-//! Where the unknowns of a constrained element are.
+//! The order of the unknowns of an element with constraints.
 
 use crate::element::Element;
 
 use crate::model::Model;
 
-/// The unknowns, and in the same order the equations: rates, multipliers inside, velocity at the end, multipliers of the nodes.
+/// The unknowns and, in the same order, the equations: rates, interior multipliers, velocity at the end, multipliers of
+/// the nodes.
 ///
-/// With s = n − 1, N coordinates and m constraints they are (s + 1)(N + m) numbers. All multipliers are divided by h, so that they have the
-/// size of reactions.
+/// With s = n − 1, N coordinates and m constraints these are (s + 1)(N + m) numbers. All multipliers are divided by h,
+/// so that they have the size of reactions.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layout {
     unknowns: usize,
@@ -26,33 +27,34 @@ impl Layout {
         }
     }
 
-    /// How many there are.
+    /// The number of unknowns.
     pub(crate) const fn size(&self) -> usize {
         self.node(self.constraints)
     }
 
-    /// Where the rates end.
+    /// The end of the rates.
     pub(crate) const fn rates(&self) -> usize {
         self.unknowns * self.coordinates
     }
 
-    /// The multiplier number j < s of a constraint: for holonomic ones the start's for j = 0 and the coefficient of P_j′ for others,
-    /// for those of velocities the one of stage j.
+    /// The place of multiplier j < s of a constraint. For holonomic constraints, j = 0 is the multiplier at the start
+    /// and the others are the coefficients of P_j′; for velocity constraints it is the multiplier of stage j.
     pub(crate) const fn inside(&self, j: usize, constraint: usize) -> usize {
         self.rates() + j * self.constraints + constraint
     }
 
-    /// The velocity at the end.
+    /// The place of a component of the velocity at the end.
     pub(crate) const fn end(&self, coordinate: usize) -> usize {
         self.rates() + self.degree * self.constraints + coordinate
     }
 
-    /// The multiplier of a constraint at the end; for those of velocities the one of the start, which is its negative.
+    /// The place of the multiplier of a constraint at the end; for velocity constraints that of the start, which is its
+    /// negative.
     pub(crate) const fn node(&self, constraint: usize) -> usize {
         self.end(self.coordinates) + constraint
     }
 
-    /// Where the multipliers are, one for each constraint.
+    /// The ranges of the multipliers, one for each constraint.
     pub(crate) fn multipliers(&self) -> impl Iterator<Item = core::ops::Range<usize>> + use<> {
         let Self { constraints, .. } = *self;
         let starts = (0..self.degree).map({
@@ -62,7 +64,7 @@ impl Layout {
         (starts.chain([self.node(0)])).map(move |start| start..start + constraints)
     }
 
-    /// Sets the multipliers to those of constant reactions λ, μ = −λ t: zero where these are not known.
+    /// Sets the multipliers to those of constant reactions λ, μ = −λ t; zero where the reactions are unknown.
     #[cfg(feature = "alloc")]
     pub(crate) fn guess<M, const N: usize>(
         &self,
@@ -78,7 +80,7 @@ impl Layout {
             for j in 0..self.degree {
                 unknowns[self.inside(j, c)] = match (constraint.kind.is_holonomic(), j) {
                     (false, _) => -lambda * (nodes[j] - 0.5),
-                    // One point alone sees no rate of μ: half of the impulse acts at either end.
+                    // A single point does not determine the rate of μ: half of the impulse acts at either end.
                     (true, 0) if self.degree == 1 => -0.5 * lambda,
                     (true, 1) => -lambda,
                     (true, _) => 0.0,
@@ -98,7 +100,7 @@ impl Layout {
     }
 }
 
-/// The first constraint of a model that the element cannot hold.
+/// The first constraint of a model that the element cannot enforce.
 pub(crate) fn refused<M, const N: usize>(element: &Element) -> Option<&'static str>
 where
     M: Model<N>,

@@ -1,4 +1,4 @@
-//! Constraints at one instant: the velocity of a momentum, independent rows, residuals.
+//! Constraints at one instant: the velocity that belongs to a momentum, independent rows, residuals.
 
 use crate::constrained::rows::Rows;
 use crate::error::{ConstraintError, LegendreError, StepError};
@@ -6,23 +6,24 @@ use crate::legendre::{lagrangian_view_from, velocity as free_velocity};
 use crate::lu;
 use crate::model::{First, Form, Model};
 
-/// The most iterations of Newton's method; one is enough where the kinetic energy is quadratic.
+/// The largest number of iterations of Newton's method; one suffices where the kinetic energy is quadratic.
 const MOST: u32 = 50;
 
-/// Memory of [`solve_velocity`]: (N + m)² numbers, N + m of them, and as many indices.
+/// Working memory of [`solve_velocity`]: (N + m)² numbers, N + m numbers, and as many indices.
 pub(crate) struct Bordered<'a> {
     pub(crate) matrix: &'a mut [f64],
     pub(crate) vector: &'a mut [f64],
     pub(crate) pivots: &'a mut [usize],
 }
 
-/// The velocity that belongs to a momentum under constraints, T-74:
+/// The velocity that belongs to a momentum under constraints (T-74):
 ///
 /// ```text
 /// L_v(q, v, t) + Aᵀν = p ,     A v + a = 0 .
 /// ```
 ///
-/// `rows` hold A and a at (t, q); only marked constraints count. The mass matrix may be singular where constraints hold the motion.
+/// `rows` holds A and a at (t, q); only marked constraints are used. The mass matrix may be singular where the
+/// constraints determine the motion.
 pub(crate) fn solve_velocity<M, const N: usize>(
     model: &M,
     t: f64,
@@ -60,7 +61,7 @@ where
             vector[N + c] = if *mark == 0 { 0.0 } else { -rows.psi(c, &v) };
         }
         lu::factor(size, matrix, pivots).map_err(|_| ConstraintError::SingularMass)?;
-        // The multiplier is solved for anew each time: it enters linearly.
+        // The multiplier is solved for anew in each iteration: it enters linearly.
         lu::solve(size, matrix, pivots, vector);
         let (mut step, mut scale) = (0.0_f64, 0.0_f64);
         for a in 0..N {
@@ -84,7 +85,7 @@ where
     .into())
 }
 
-/// Writes [ L_vv Aᵀ ; A 0 ] with the marked rows, and a one on the diagonal for each of the others, into zeros.
+/// Writes [ L_vv Aᵀ ; A 0 ] with the marked rows into zeros, and a one on the diagonal for each of the other rows.
 pub(super) fn border<const N: usize>(
     matrix: &mut [f64],
     zz: &[[f64; N]; N],
@@ -108,12 +109,14 @@ pub(super) fn border<const N: usize>(
     }
 }
 
-/// A mass matrix with a pivot below this part of its column, and of what was subtracted on the way to it, leaves the velocity of a momentum to the constraints.
+/// If a pivot of the mass matrix is below this fraction of its column, and of the terms subtracted from it, the
+/// velocity of a momentum is determined with the constraints.
 const SINGULAR: f64 = 1e-10;
 
-/// Whether a mass matrix alone says the velocity of a momentum.
+/// Whether the mass matrix alone determines the velocity of a momentum.
 pub(crate) fn is_regular<const N: usize>(mut zz: [[f64; N]; N]) -> bool {
-    // Columns carry the units of their coordinate, as rows do: a pivot is small only beside its column, and beside what it is the rest of.
+    // Columns have the units of their coordinates, and so do rows: a pivot is small only relative to its column and to
+    // the terms subtracted from it.
     let mut scales = [0.0_f64; N];
     for row in &zz {
         for (scale, entry) in scales.iter_mut().zip(row) {
@@ -128,12 +131,14 @@ pub(crate) fn is_regular<const N: usize>(mut zz: [[f64; N]; N]) -> bool {
     })
 }
 
-/// The velocity that a momentum has without regard to the constraints, `v` being the one with it: the same if the state is consistent.
+/// The velocity that belongs to a momentum without regard to the constraints; `v` is the one with them, which is the
+/// same if the state is consistent.
 ///
-/// Where the mass matrix is singular up to rounding, as for quaternions, the momentum alone has no velocity: then it is `v`.
+/// Where the mass matrix is singular up to rounding, as for quaternions, the momentum alone does not determine a
+/// velocity: then the result is `v`.
 ///
 /// # Errors
-/// [`LegendreError`] where a regular mass matrix leads to none.
+/// [`LegendreError`] if none is found although the mass matrix is regular.
 pub(crate) fn own_velocity<M, const N: usize>(
     model: &M,
     t: f64,

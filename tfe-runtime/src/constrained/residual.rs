@@ -1,12 +1,12 @@
-//! How far constraints are from holding.
+//! The relative violation of constraints.
 
 use super::rows::{Rows, norm};
 
-/// Velocities that move so small a part of the positions in one step are rest.
+/// A velocity that moves less than this fraction of the positions in one step counts as rest.
 const REST: f64 = 1e-5;
 
-/// By how much positions and velocities violate a constraint that was evaluated: the distance |φ| / |A| relative to the positions, and |A v + a| / |A|
-/// relative to the velocities, those that a step of length h sees.
+/// The relative violation, by positions and by velocities, of a constraint that has been evaluated: the distance |φ| /
+/// |A| relative to the positions, and |A v + a| / |A| relative to the velocities that matter in a step of length h.
 pub(crate) fn relative_residual<const N: usize>(
     rows: &Rows<'_, N>,
     c: usize,
@@ -26,7 +26,7 @@ pub(crate) fn relative_residual<const N: usize>(
     )
 }
 
-/// |value| / scale; zero over zero is zero, NaN stays NaN.
+/// |value| / scale; 0/0 is zero, and NaN stays NaN.
 pub(super) fn over(value: f64, scale: f64) -> f64 {
     if value == 0.0 {
         0.0

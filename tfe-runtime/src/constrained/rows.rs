@@ -1,27 +1,27 @@
-//! Constraints evaluated at a point, on the caller's memory.
+//! Constraints evaluated at a point, on memory provided by the caller.
 
 use crate::model::{Constraint, ConstraintSecond, Model};
 
-/// The numbers that [`Rows`] need.
+/// The number of values that [`Rows`] needs.
 pub(crate) const fn rows_len(coordinates: usize, constraints: usize) -> usize {
     constraints * (5 * coordinates + 3) + weights_len(constraints)
 }
 
-/// Of these, what is kept from step to step.
+/// The number of these that are kept from step to step.
 const fn weights_len(constraints: usize) -> usize {
     constraints * (2 * constraints + 1)
 }
 
-/// The mark of a row that is a combination of all holonomic ones.
+/// The mark of a row that is a combination of holonomic ones.
 pub(super) const COMBINED: usize = 3;
 
-/// What is left of a row beside the independent ones, relative to the row: below it the row is dependent.
+/// A row is dependent if its part orthogonal to the independent ones is below this fraction of the row.
 pub(super) const DEPENDENT: f64 = 1e-10;
 
-/// A row that was chosen before stays chosen while it has so much of its own.
+/// A row that was chosen before stays chosen while its orthogonal part is at least this fraction.
 const KEPT: f64 = 0.1;
 
-/// The constraints of a model, whichever it is: what is rarely done with them is compiled for all models at once.
+/// The constraints of a model without its type: code that is rarely needed is compiled once for all models.
 pub(crate) trait Constrains<const N: usize> {
     /// The constraints, in order.
     fn declared(&self) -> &'static [Constraint];
@@ -35,7 +35,7 @@ pub(crate) trait Constrains<const N: usize> {
         numbers: (&mut [f64], &mut [f64]),
     );
 
-    /// ψ_q, Ȧ and what multipliers bend.
+    /// ψ_q, Ȧ and the second derivatives weighted by multipliers.
     fn second_at(
         &self,
         t: f64,
@@ -74,7 +74,7 @@ impl<M: Model<N>, const N: usize> Constrains<N> for M {
     }
 }
 
-/// The constraints at the point that was evaluated last; a row, or a number, for each.
+/// The constraints at the point that was evaluated last; one row, or one number, for each.
 pub(crate) struct Rows<'a, const N: usize> {
     /// A at the start of the element.
     pub(crate) start: &'a mut [[f64; N]],
@@ -87,20 +87,20 @@ pub(crate) struct Rows<'a, const N: usize> {
     pub(super) spare: &'a mut [[f64; N]],
     /// a
     pub(crate) drift: &'a mut [f64],
-    /// φ of holonomic ones.
+    /// φ of the holonomic constraints.
     pub(crate) values: &'a mut [f64],
-    /// Multipliers to differentiate with.
+    /// The multipliers in derivatives.
     pub(crate) mu: &'a mut [f64],
     /// The weights of constraints in combined rows, a row for each.
     pub(super) weights: &'a mut [f64],
-    /// U, with which multipliers are combined, a row for each column of it.
+    /// U, by which multipliers are combined; its columns are stored as rows.
     pub(super) basis: &'a mut [f64],
-    /// The lengths of the rows of A where they were combined.
+    /// The lengths of the rows of A at the point where they were combined.
     pub(super) lengths: &'a mut [f64],
     pub(super) is_combined: bool,
 }
 
-/// What multipliers bend: the derivatives of Aᵀμ and of Ȧᵀμ.
+/// The derivatives of Aᵀμ and of Ȧᵀμ.
 #[derive(Clone, Copy)]
 pub(crate) struct Bend<const N: usize> {
     /// ∂(Aᵀμ)/∂q
@@ -112,7 +112,8 @@ pub(crate) struct Bend<const N: usize> {
 }
 
 impl<'a, const N: usize> Rows<'a, N> {
-    /// In memory of [`rows_len`] numbers. Kernels write only what can be non-zero: the rest is cleared here once.
+    /// Divides a slice of [`rows_len`] numbers. Kernels write only entries that can be non-zero; the others are set to
+    /// zero here, once.
     pub(crate) fn of(memory: &'a mut [f64], constraints: usize) -> Self {
         let (memory, kept) = memory.split_at_mut(constraints * (5 * N + 3));
         memory.fill(0.0);
@@ -143,7 +144,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         }
     }
 
-    /// Evaluated at the start of an element, with A kept as that of the start.
+    /// Evaluates the rows at the start of an element, and keeps A there.
     pub(crate) fn at_start(
         memory: &'a mut [f64],
         model: &dyn Constrains<N>,
@@ -156,7 +157,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         rows
     }
 
-    /// The same for an element whose rows were [combined](Self::combine) before, as the marks tell.
+    /// The same for an element whose rows were already [combined](Self::combine), as the marks tell.
     pub(crate) fn at_start_again(
         memory: &'a mut [f64],
         model: &dyn Constrains<N>,
@@ -183,7 +184,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         }
     }
 
-    /// Combines what was evaluated.
+    /// Combines the evaluated rows.
     #[inline(never)]
     fn combine_evaluated(&mut self) {
         combine(self.weights, self.rows, self.spare);
@@ -201,7 +202,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         }
     }
 
-    /// The same of the constraints as they were declared.
+    /// Evaluates the constraints as declared, without combining them.
     pub(crate) fn evaluate_declared<C>(&mut self, model: &C, t: f64, q: &[f64; N])
     where
         C: Constrains<N> + ?Sized,
@@ -220,13 +221,13 @@ impl<'a, const N: usize> Rows<'a, N> {
         self.is_combined
     }
 
-    /// The weights of the constraints as declared in the rows, a row for each, where they are combinations.
+    /// The weights of the declared constraints in the rows, a row for each, if the rows are combinations.
     #[cfg(feature = "alloc")]
     pub(crate) fn combination(&self) -> Option<&[f64]> {
         self.is_combined.then_some(&*self.weights)
     }
 
-    /// Evaluates ψ_q and Ȧ, and what the multipliers `mu` bend.
+    /// Evaluates ψ_q and Ȧ, and the second derivatives with the multipliers `mu`.
     pub(crate) fn differentiate<C>(
         &mut self,
         model: &C,
@@ -260,7 +261,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         bend
     }
 
-    /// Before constraints as declared are differentiated: their multipliers, with room for what is written.
+    /// Before the declared constraints are differentiated: computes their multipliers, and clears the output.
     #[inline(never)]
     fn declare_multipliers(&mut self) {
         self.psi_q.fill([0.0; N]);
@@ -274,7 +275,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         self.exchange_multipliers();
     }
 
-    /// After that: the multipliers that were, and what was differentiated combined.
+    /// Afterwards: restores the multipliers, and combines the derivatives.
     #[inline(never)]
     fn combine_differentiated(&mut self) {
         self.exchange_multipliers();
@@ -288,7 +289,7 @@ impl<'a, const N: usize> Rows<'a, N> {
         }
     }
 
-    /// How independent the rows are that were evaluated last.
+    /// The independence of the rows that were evaluated last.
     pub(crate) fn independence(&mut self) -> Independence {
         let (mut shortest, mut longest_row) = (f64::INFINITY, 0.0_f64);
         for (spare, row) in self.spare.iter_mut().zip(&*self.rows) {
@@ -320,16 +321,17 @@ impl<'a, const N: usize> Rows<'a, N> {
         dot(&self.rows[constraint], v) + self.drift[constraint]
     }
 
-    /// Marks a largest set of independent rows with ones; returns how many they are.
+    /// Marks a largest set of independent rows with ones, and returns their number.
     ///
-    /// Gram–Schmidt with the row next that has most of its own, relative to its length; holonomic rows come before others, because a
-    /// constraint on velocities may follow from one on positions. Rows that were marked stay so while they can, so that the choice does not
-    /// flicker from element to element.
+    /// This is Gram–Schmidt orthogonalisation with pivoting: the row with the largest orthogonal part, relative to its
+    /// length, comes next. Holonomic rows come before others, because a constraint on velocities may follow from one on
+    /// positions. Rows that were marked stay marked while they can, so that the choice does not alternate from element
+    /// to element.
     pub(crate) fn choose(&mut self, declared: &[Constraint], active: &mut [usize]) -> usize {
         for (spare, row) in self.spare.iter_mut().zip(&*self.rows) {
             let length = norm(row);
             for a in 0..N {
-                // A row of zeros constrains nothing.
+                // A row of zeros imposes no constraint.
                 spare[a] = if length > 0.0 { row[a] / length } else { 0.0 };
             }
         }
@@ -376,14 +378,15 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 }
 
-/// What rows have of their own.
+/// How independent rows are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Independence {
-    /// How many are independent.
+    /// The number of independent rows.
     pub(crate) rank: usize,
-    /// What the last of them has beside those before it, relative to its length; each time that which has most comes next.
+    /// The orthogonal part of the last independent row, relative to its length, when the row with the largest
+    /// orthogonal part comes next each time.
     pub(crate) least: f64,
-    /// The shortest row relative to the longest one.
+    /// The length of the shortest row relative to the longest.
     pub(crate) shortest: f64,
 }
 
@@ -393,7 +396,7 @@ pub(super) fn longest<const N: usize>(rows: &[[f64; N]]) -> Option<(usize, f64)>
     lengths.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Leaves what is orthogonal to a direction. Twice is enough for that to rounding.
+/// Makes a row orthogonal to a direction; two passes suffice up to rounding.
 pub(super) fn subtract_part<const N: usize>(row: &mut [f64; N], direction: &[f64; N]) {
     for _ in 0..2 {
         let part = dot(row, direction);
@@ -403,7 +406,7 @@ pub(super) fn subtract_part<const N: usize>(row: &mut [f64; N], direction: &[f64
     }
 }
 
-/// Adds so much of one row of a square matrix to another.
+/// Adds a multiple of one row of a square matrix to another.
 pub(super) fn add_row(matrix: &mut [f64], (from, to): (usize, usize), part: f64) {
     let count = matrix.len().isqrt();
     for c in 0..count {
@@ -411,7 +414,7 @@ pub(super) fn add_row(matrix: &mut [f64], (from, to): (usize, usize), part: f64)
     }
 }
 
-/// A row over a length.
+/// A row divided by a length.
 pub(super) fn scaled<const N: usize>(row: &[f64; N], length: f64) -> [f64; N] {
     let mut scaled = *row;
     for entry in &mut scaled {
@@ -420,7 +423,7 @@ pub(super) fn scaled<const N: usize>(row: &[f64; N], length: f64) -> [f64; N] {
     scaled
 }
 
-/// weights · rows, with memory for as many.
+/// weights · rows, in place, with scratch memory of the same size.
 fn combine<const N: usize>(weights: &[f64], rows: &mut [[f64; N]], spare: &mut [[f64; N]]) {
     for (sum, weights) in spare.iter_mut().zip(weights.chunks_exact(rows.len())) {
         *sum = [0.0; N];
@@ -441,7 +444,7 @@ pub(crate) fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     sum
 }
 
-/// Whether a sum of squares has its digits: smaller ones have lost some, or all, and larger ones are infinite.
+/// Whether a sum of squares has all its digits: smaller ones have lost some, or all, and larger ones are infinite.
 pub(crate) fn has_digits(square: f64) -> bool {
     (1e-290..=f64::MAX).contains(&square)
 }
@@ -455,7 +458,7 @@ pub(crate) fn norm<const N: usize>(row: &[f64; N]) -> f64 {
     }
 }
 
-/// The norm of numbers whose squares are too small or too large; NaN if one is.
+/// The norm of numbers whose squares are too small or too large; NaN if one of them is NaN.
 #[cold]
 #[inline(never)]
 pub(crate) fn scaled_norm(entries: impl Iterator<Item = f64> + Clone) -> f64 {

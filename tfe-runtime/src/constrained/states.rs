@@ -1,4 +1,4 @@
-//! What belongs to one state: the velocity of its momentum, independent rows, residuals.
+//! Constraints at one state: the velocity that belongs to its momentum, independent constraints, residuals.
 
 use super::choose::choose;
 use super::node::{Bordered, own_velocity, solve_velocity};
@@ -9,12 +9,12 @@ use crate::model::Model;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// By how much a state violates one constraint.
+/// The violation of one constraint by a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual {
-    /// Its name.
+    /// The name of the constraint.
     pub constraint: &'static str,
-    /// φ; zero for a constraint on velocities.
+    /// φ; zero for a velocity constraint.
     pub position: f64,
     /// A v + a
     pub velocity: f64,
@@ -25,7 +25,7 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// The larger one of the relative residuals; NaN if one is.
+    /// The larger of the two relative violations; NaN if one of them is NaN.
     #[must_use]
     pub fn relative(&self) -> f64 {
         let (position, velocity) = (self.relative_position, self.relative_velocity);
@@ -37,9 +37,9 @@ impl Residual {
     }
 }
 
-/// By how much positions and velocities violate the constraints of a model, one entry for each.
+/// The violation of the constraints of a model by positions and velocities, one entry for each.
 ///
-/// Velocities are small or large beside those that matter in a time of length `h`, such as a step.
+/// The length `h` of a time, such as a step, sets the scale for velocities.
 #[must_use]
 pub fn residuals<M, const N: usize>(
     model: &M,
@@ -77,7 +77,7 @@ pub(super) fn residuals_of<const N: usize>(
     declared.iter().enumerate().map(of).collect()
 }
 
-/// Which constraints are independent at a position: the others follow from them there.
+/// Which constraints are independent at a position; the others follow from them there.
 #[must_use]
 pub fn independent<M, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> Vec<bool>
 where
@@ -88,7 +88,7 @@ where
     active.into_iter().map(|mark| mark != 0).collect()
 }
 
-/// The rows at a position, and marks of those that are independent there; in memory of [`rows_len`] numbers.
+/// The rows at a position, and marks of the independent ones, in memory of [`rows_len`] numbers.
 pub(super) fn chosen<'a, M, const N: usize>(
     model: &M,
     (t, q): (f64, &[f64; N]),
@@ -142,8 +142,8 @@ where
     solve_velocity(model, t, (q, p), guess, &rows, &active, &mut memory)
 }
 
-/// The velocity of a state as its momentum has it, whether or not it fulfils the constraints; where the mass matrix is singular, the one that the constraints
-/// leave.
+/// The velocity that belongs to the momentum of a state, whether or not it satisfies the constraints; where the mass
+/// matrix is singular, the velocity that the constraints determine.
 ///
 /// # Errors
 /// As for [`velocity`].
@@ -165,7 +165,8 @@ where
     })
 }
 
-/// The velocity nearest to `v`, in the metric of the kinetic energy, that the constraints allow: that of the momentum L_v(q, v, t).
+/// The velocity that satisfies the constraints and is nearest to `v` in the metric of the kinetic energy: the one that
+/// belongs to the momentum L_v(q, v, t).
 ///
 /// # Errors
 /// As for [`velocity`].

@@ -1,4 +1,4 @@
-//! The derivative of the equations of a constrained element, piece by piece.
+//! The tangent of an element with constraints, part by part.
 
 use crate::constrained::element::{Declared, ElementConstraints, End};
 use crate::constrained::rows::Bend;
@@ -55,7 +55,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         }
     }
 
-    /// Adds what start and end give to the tangent; the rows are those of the end.
+    /// Adds the contributions of start and end to the tangent; the rows are those of the end.
     pub(super) fn add_ends(
         &self,
         declared: Declared,
@@ -102,7 +102,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         }
     }
 
-    /// Adds what momentum and forces at a point give to the tangent.
+    /// Adds the contributions of momentum and force at a point to the tangent.
     pub(super) fn add_element(&self, l: usize, by: &PointTangent<N>, tangent: &mut [f64]) {
         let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
         let (points, rates) = (scheme.points(), self.layout.rates());
@@ -122,7 +122,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         }
     }
 
-    /// Adds what a point gives to the derivative by the coordinates at the start.
+    /// Adds the contributions of a point to the derivative by the coordinates at the start.
     pub(super) fn add_start(
         &self,
         declared: Declared,
@@ -161,7 +161,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         }
     }
 
-    /// Adds what the end gives to the derivative by the coordinates at the start.
+    /// Adds the contributions of the end to the derivative by the coordinates at the start.
     pub(super) fn add_end_by_start(
         &self,
         declared: Declared,

@@ -1,4 +1,4 @@
-//! What the iterations of one run have found, element after element: where those of another run of the same motion may start.
+//! A trail: the solutions of the elements of one run, as initial guesses for another run of the same motion.
 
 use crate::basis::{MAX_NODES, legendre};
 use crate::constrained::element::slopes;
@@ -13,13 +13,14 @@ use alloc::vec::Vec;
 pub struct Trail {
     /// Start and length of each element.
     spans: Vec<(f64, f64)>,
-    /// Legendre coefficients of the rates, multipliers inside, multipliers of the nodes; of all elements, one after the other.
+    /// For each element the Legendre coefficients of the rates, the interior multipliers, and the multipliers of the
+    /// nodes; one element after the other.
     numbers: Vec<f64>,
-    /// The degree of their elements.
+    /// The degree of the elements.
     degree: usize,
 }
 
-/// What there is of a model.
+/// The dimensions of a model.
 #[derive(Clone, Copy)]
 pub(crate) struct Of<'a> {
     coordinates: usize,
@@ -36,22 +37,22 @@ impl Of<'static> {
 }
 
 impl Of<'_> {
-    /// Of the unknowns of its elements.
+    /// The layout of the unknowns of its elements.
     fn layout(self, scheme: &SchemeRef<'_>) -> Layout {
         Layout::new(&scheme.element, self.coordinates, self.constraints.len())
     }
 }
 
-/// Where the iteration of a coming step may start.
+/// The initial guess of a coming step.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Foreseen {
-    /// Its start and its length.
+    /// The start and length of that step.
     step: Option<(f64, f64)>,
     unknowns: Vec<f64>,
 }
 
 impl Foreseen {
-    /// Looks up a step; without one nothing is foreseen.
+    /// Finds the guess for a step; without a step, there is none.
     pub(crate) fn look(
         &mut self,
         trail: &Trail,
@@ -64,7 +65,7 @@ impl Foreseen {
         self.step = is_known.then_some(step);
     }
 
-    /// Writes what was foreseen for a step, all but the velocity at its end; false where that is nothing.
+    /// Writes the guess for a step, except for the velocity at its end; false if there is none.
     pub(crate) fn take(
         &mut self,
         scheme: &SchemeRef<'_>,
@@ -92,7 +93,7 @@ struct Found<'a> {
 }
 
 impl Trail {
-    /// Without elements.
+    /// A trail without elements.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -104,13 +105,13 @@ impl Trail {
         self.numbers.clear();
     }
 
-    /// The time up to which it goes; nothing without elements.
+    /// The time at which the trail ends; `None` without elements.
     #[must_use]
     pub fn end(&self) -> Option<f64> {
         self.spans.last().map(|(start, length)| start + length)
     }
 
-    /// Adds an element of Gauss points; one of another degree than those before replaces them.
+    /// Adds an element with Gauss points; if its degree differs from that of the elements before, it replaces them.
     pub(crate) fn push(
         &mut self,
         scheme: &SchemeRef<'_>,
@@ -162,7 +163,8 @@ impl Trail {
         })
     }
 
-    /// Writes the unknowns of an element of Gauss points from t to t + h, all but the velocity at its end; false, with nothing written, where the trail does not reach that far.
+    /// Writes the unknowns of an element with Gauss points from t to t + h, except for the velocity at its end; false,
+    /// with nothing written, where the trail does not reach that far.
     fn foresee(
         &self,
         scheme: &SchemeRef<'_>,
@@ -170,7 +172,7 @@ impl Trail {
         (t, h): (f64, f64),
         unknowns: &mut [f64],
     ) -> bool {
-        /// So much of an element may lie beyond the last one.
+        /// The fraction of an element that may lie beyond the end of the trail.
         const BEYOND: f64 = 0.1;
         let n = of.coordinates;
         let reaches = |(start, length): &(f64, f64)| {
@@ -211,7 +213,7 @@ impl Trail {
     }
 }
 
-/// Where the multipliers of a constraint are.
+/// The places of the multipliers of a constraint.
 #[derive(Clone, Copy)]
 struct Multipliers {
     of: usize,
@@ -220,29 +222,30 @@ struct Multipliers {
 }
 
 impl Multipliers {
-    /// Those inside, and after the last of them the one of the node.
+    /// The interior multipliers; after the last of them, that of the node.
     fn inside(&self, j: usize) -> usize {
         self.first + j * self.count + self.of
     }
 }
 
 impl Found<'_> {
-    /// Where a time lies in the element.
+    /// The place of a time in the element.
     fn place(&self, t: f64) -> f64 {
         (t - self.span.0) / self.span.1
     }
 
-    /// Whether the last Legendre coefficient of the rates is small beside the others. Another element that started from a wrong root of a step that is too long might find one beside
-    /// it, and the two would agree.
+    /// Whether the last Legendre coefficient of the rates is small relative to the others. A wrong root, of a step that
+    /// is too long, must not be used as a guess: another element started from it might find a root near it, and the two
+    /// would agree.
     fn is_resolved(&self, coordinates: usize) -> bool {
-        /// Beside the largest.
+        /// Relative to the largest coefficient.
         const SMALL: f64 = 0.01;
         let rates = &self.numbers[..self.degree * coordinates];
         let size = |rates: &[f64]| rates.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
         size(&rates[(self.degree - 1) * coordinates..]) <= SMALL * size(rates)
     }
 
-    /// A sum of Legendre polynomials at a time.
+    /// The sum of Legendre polynomials at a time.
     fn legendre_sum(&self, t: f64, place: impl Fn(usize) -> usize) -> f64 {
         let mut values = [0.0; MAX_NODES];
         legendre(self.place(t), &mut values);
@@ -252,7 +255,8 @@ impl Found<'_> {
             .sum()
     }
 
-    /// Shows the multipliers of a constraint of another element, inside and, without a number, at the node: the part of the same reactions that belongs to it.
+    /// Passes to `show` the multipliers of a constraint for another element, interior ones with their number and that
+    /// of the node without one: those that give the same reactions there.
     fn multipliers(
         &self,
         constraint: &Constraint,
@@ -263,7 +267,7 @@ impl Found<'_> {
     ) {
         let degree = scheme.element.degree();
         if !constraint.kind.is_holonomic() {
-            // μ/h, which vanishes in the mean of both ends.
+            // μ/h, normalised such that the mean of both ends vanishes.
             let at = |t: f64| self.legendre_sum(t, |j| place.inside(j)) * self.span.1 / h;
             let mean = 0.5 * (at(t) + at(t + h));
             for (l, node) in scheme.unknown_nodes.iter().enumerate() {
@@ -271,7 +275,7 @@ impl Found<'_> {
             }
             return show(None, at(t) - mean);
         }
-        // μ̇ at the points, and its part along each P_j′, which are orthogonal with the weight 1 − x².
+        // μ̇ at the points, and its components along each P_j′, which are orthogonal with weight 1 − x².
         show(Some(0), self.numbers[place.inside(0)]);
         show(None, self.numbers[place.inside(self.degree)]);
         let mut parts = [0.0; MAX_RATES];

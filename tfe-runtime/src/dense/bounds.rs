@@ -1,4 +1,4 @@
-//! What an element does not leave: bounds of its polynomials (T-128).
+//! Bounds of the polynomials of an element: enclosures of all states inside it (T-128).
 
 use super::DenseElement;
 use crate::basis::{MAX_NODES, MOST_OF_INTEGRALS};
@@ -8,20 +8,20 @@ use crate::model::Form;
 use crate::real::Real;
 use alloc::vec::Vec;
 
-/// What outputs are functions of, along an element or a part of it.
+/// The arguments of outputs, along an element or a part of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arguments<R, const N: usize> {
     /// The time.
     pub t: R,
     /// Coordinates.
     pub q: [R; N],
-    /// Velocities: the derivative of the coordinates' polynomial.
+    /// Velocities: the derivative of the polynomial of the coordinates.
     pub v: [R; N],
     /// Momenta.
     pub p: [R; N],
 }
 
-/// Powers of y ∈ [−1, 1].
+/// The enclosure of a power of y ∈ [−1, 1].
 fn power(exponent: usize) -> Enclosure {
     match exponent {
         0 => Enclosure::from_f64(1.0),
@@ -30,17 +30,18 @@ fn power(exponent: usize) -> Enclosure {
     }
 }
 
-/// Legendre polynomials of τ = m + r y as polynomials of y, with the sizes of what was added up for each coefficient.
+/// Legendre polynomials of τ = m + r y expanded in powers of y, with the sums of magnitudes from which each coefficient
+/// has been computed.
 struct Expansion {
     radius: f64,
-    /// Coefficients, their sizes, and the same one degree lower.
+    /// The coefficients, their sums of magnitudes, and the same of one degree lower.
     here: [[f64; MAX_NODES]; 2],
     before: [[f64; MAX_NODES]; 2],
     degree: usize,
 }
 
 impl Expansion {
-    /// That of degree zero, over a part of the element.
+    /// The expansion of degree zero, over a part of the element.
     fn over((from, to): (f64, f64)) -> (f64, Self) {
         let mut one = [[0.0; MAX_NODES]; 2];
         (one[0][0], one[1][0]) = (1.0, 1.0);
@@ -53,7 +54,7 @@ impl Expansion {
         (0.5 * (from + to), expansion)
     }
 
-    /// The next: (n + 1) P_{n+1} = (2n + 1) x P_n − n P_{n−1} with x = 2m − 1 + 2 r y.
+    /// Goes on to the next degree: (n + 1) P_{n+1} = (2n + 1) x P_n − n P_{n−1} with x = 2m − 1 + 2 r y.
     fn raise(&mut self, middle: f64) {
         let n = self.degree as f64;
         let (place, slope) = (2.0 * middle - 1.0, 2.0 * self.radius);
@@ -107,7 +108,7 @@ impl Expansions {
                 sizes[j] += size[j] * rate.abs();
             }
         }
-        // Each of the sums and of the recurrences has some four roundings a degree.
+        // Each of the sums and recurrences has about four rounding errors for each degree.
         let rounding = 8.0 * f64::EPSILON * (self.count + 1) as f64;
         let mut coefficients = [Enclosure::ZERO; MAX_NODES];
         for (j, coefficient) in coefficients[..self.count].iter_mut().enumerate() {
@@ -130,7 +131,7 @@ struct Powers {
 }
 
 impl Powers {
-    /// Σ w_j c_j y^{j + shift}, without the terms whose power would be negative.
+    /// Σ w_j c_j y^{j + shift}, without the terms whose exponent would be negative.
     fn sum(&self, shift: isize, weight: impl Fn(usize) -> f64) -> Enclosure {
         let mut sum = Enclosure::ZERO;
         for (j, coefficient) in self.coefficients[..self.count].iter().enumerate() {
@@ -142,23 +143,24 @@ impl Powers {
         sum
     }
 
-    /// Polynomial and derivative by τ.
+    /// The polynomial and its derivative by τ.
     fn rate(&self) -> Dual<Enclosure> {
         let value = self.sum(0, |_| 1.0);
         Dual::new(value, self.sum(-1, |j| j as f64 / self.radius))
     }
 
-    /// The integral from the middle on, and the polynomial.
+    /// The integral from the middle, and the polynomial.
     fn integral(&self) -> Dual<Enclosure> {
         let value = self.sum(1, |j| self.radius / (j + 1) as f64);
         Dual::new(value, self.sum(0, |_| 1.0))
     }
 }
 
-/// For what is rounded in sums and polynomials.
+/// An allowance for rounding errors in sums and polynomials.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
-/// Bounds of a coordinate, or a momentum, all along an element: by the coefficients of its rate, of which the first does not count, and its ends.
+/// Bounds of a coordinate, or a momentum, along the whole element, from the coefficients of its rate, except the first,
+/// and its values at the ends.
 fn along(others: impl Iterator<Item = f64>, ends: (f64, f64)) -> Enclosure {
     let mut radius = ROUNDING * (ends.0.abs() + ends.1.abs());
     for (rate, most) in others.zip(&MOST_OF_INTEGRALS[1..]) {
@@ -168,7 +170,7 @@ fn along(others: impl Iterator<Item = f64>, ends: (f64, f64)) -> Enclosure {
     Enclosure::between(low - radius, high + radius)
 }
 
-/// Bounds of a velocity all along an element, by the coefficients of the rate and one over the length.
+/// Bounds of a velocity along the whole element, from the coefficients of the rate and the reciprocal of the length.
 fn velocity_along(mean: f64, others: impl Iterator<Item = f64>, by_time: f64) -> Enclosure {
     let sum = others.fold(0.0, |sum, rate| sum + rate.abs());
     let radius = sum + ROUNDING * (sum + mean.abs());
@@ -182,7 +184,7 @@ fn time_over(times: (f64, f64), (from, to): (f64, f64)) -> Dual<Enclosure> {
     Dual::new(time(from).hull(time(to)), length)
 }
 
-/// A coordinate, or a momentum, over a part of an element whose middle it passes at a value.
+/// A coordinate, or a momentum, over a part of an element, with a given value in the middle.
 fn over(powers: &Powers, centre: f64, start: f64) -> Dual<Enclosure> {
     let rounding = ROUNDING * (centre.abs() + start.abs());
     let centre = Enclosure::between(centre - rounding, centre + rounding);
@@ -190,7 +192,7 @@ fn over(powers: &Powers, centre: f64, start: f64) -> Dual<Enclosure> {
     Dual::new(centre + value, slope)
 }
 
-/// The velocity there.
+/// The velocity over that part.
 fn velocity_over(powers: &Powers, length: f64) -> Dual<Enclosure> {
     let by_time = Enclosure::from_f64(1.0) / Enclosure::from_f64(length);
     let Dual { value, slope, .. } = powers.rate();
@@ -198,8 +200,9 @@ fn velocity_over(powers: &Powers, length: f64) -> Dual<Enclosure> {
 }
 
 impl<const N: usize> DenseElement<N> {
-    /// Bounds of what outputs of a `form` are functions of, all along an element of one [piece](Self::pieces): q ∈ [q₀, q₁] ± Σ |r_k|/(2k + 1) with the coefficients
-    /// r_k of the rate, k ≥ 1. Quick, and wide where the motion bends. Of velocities and momenta those that the form does not need are not looked at.
+    /// Bounds of the arguments of outputs of a `form`, along the whole of an element of one [piece](Self::pieces): q ∈
+    /// [q₀, q₁] ± Σ |r_k|/(2k + 1) with the coefficients r_k of the rate, k ≥ 1. They are cheap, and wide where the
+    /// motion is strongly curved. Of velocities and momenta, those that the form does not need are not computed.
     #[must_use]
     #[inline]
     pub fn bounds(&self, form: Form) -> Arguments<Enclosure, N> {
@@ -237,8 +240,9 @@ impl<const N: usize> DenseElement<N> {
         bounds
     }
 
-    /// Bounds over a part of an element of one [piece](Self::pieces), from τ to τ, and of the derivatives by τ: by Taylor's polynomials about the middle, whose width
-    /// falls with that of the part.
+    /// Bounds of the arguments of outputs, and of their derivatives by τ, over a part from τ to τ of an element of one
+    /// [piece](Self::pieces). They come from Taylor polynomials about the middle, whose width decreases with that of
+    /// the part.
     #[must_use]
     pub fn bounds_over(&self, part: (f64, f64)) -> Arguments<Dual<Enclosure>, N> {
         let (rates, forces) = self.rates.split_at(self.rates.len() / 2);
@@ -262,16 +266,16 @@ impl<const N: usize> DenseElement<N> {
     }
 }
 
-/// What outputs of a model of run-time length are functions of, along an element or a part of it.
+/// The arguments of outputs of a model of run-time length, along an element or a part of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LongArguments<R> {
     /// The time.
     pub t: R,
     /// Coordinates.
     pub q: Vec<R>,
-    /// Velocities of a Lagrangian: the derivative of the coordinates' polynomial.
+    /// Velocities, for a Lagrangian: the derivative of the polynomial of the coordinates.
     pub v: Vec<R>,
-    /// Momenta of a Hamiltonian.
+    /// Momenta, for a Hamiltonian.
     pub p: Vec<R>,
 }
 
@@ -285,14 +289,14 @@ pub(crate) struct Rows<'a> {
     pub(crate) end: [&'a [f64]; 2],
 }
 
-/// The coefficients of one of n coordinates but for the first.
+/// The coefficients of one of n coordinates, except the first.
 fn others(rates: &[f64], n: usize, a: usize) -> impl Iterator<Item = f64> {
     let rows = rates.chunks_exact(n.max(1)).skip(1);
     rows.map(move |row| row[a])
 }
 
 impl Rows<'_> {
-    /// The same as of elements of fixed size.
+    /// As for elements of fixed size.
     pub(crate) fn bounds(&self, form: Form) -> LongArguments<Enclosure> {
         let [q, p] = self.start;
         let n = q.len();
@@ -318,7 +322,7 @@ impl Rows<'_> {
         }
     }
 
-    /// The same as of elements of fixed size; `centre` is the state at the middle of the part.
+    /// As for elements of fixed size; `centre` is the state in the middle of the part.
     pub(crate) fn bounds_over(
         &self,
         form: Form,

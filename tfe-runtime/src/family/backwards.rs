@@ -1,4 +1,5 @@
-//! Gradients of losses backwards along elements of run-time length: one row times their derivatives, and derivatives by all parameters at once (T-127, T-149).
+//! Gradients of losses by going backwards along a run of a model of run-time length: products of a row with the
+//! derivatives of elements, and derivatives by all parameters at once (T-127, T-149).
 
 mod held;
 mod iteration;
@@ -31,21 +32,25 @@ use core::fmt;
 use iteration::Iteration;
 use written::{Points, add_of_place, add_of_points, add_of_rows_at};
 
-/// Goes backwards along a run, from its last node: carries the row λ = ∂ℓ/∂(p, q) of a loss ℓ, and adds up its derivatives by all parameters.
+/// The adjoint of a run, from its last node to the first: carries the row λ = ∂ℓ/∂(p, q) of a loss ℓ, and accumulates
+/// its derivatives by all parameters.
 ///
 /// ```text
 /// λ_e = (∂y_{e+1}/∂y_e)ᵀ λ_{e+1} ,     dℓ/da += (∂y_{e+1}/∂a)ᵀ λ_{e+1}                                      (T-127)
 /// ```
 ///
-/// Elements are solved once more. Where the equations are M q̈ = f with a constant diagonal M and the iteration contracts, memory and time are linear in the number of coordinates; else a sparse matrix of all points is factored.
+/// Each element is solved once more. Where the equations are M q̈ = f with a constant diagonal M and the iteration
+/// contracts, memory and time are linear in the number of coordinates; otherwise a sparse matrix for all points is
+/// factored.
 pub struct Backwards<'m, M> {
     view: View<'m, M>,
     ground: Ground,
     stepper: Stepper<'m, M>,
     iteration: Option<Iteration>,
-    /// Made when it is needed.
+    /// Made on first use.
     rates: Option<Rates<()>>,
-    /// L_vv of a Lagrangian, at nodes, and the same bordered by the rows of constraints; made when they are needed.
+    /// Solves with L_vv of a Lagrangian at nodes, and with L_vv bordered by the rows of constraints; both are made on
+    /// first use.
     node: Option<Node>,
     bordered: Option<(Rows, Node)>,
     tape: Tape,
@@ -53,7 +58,7 @@ pub struct Backwards<'m, M> {
     places: Places,
 }
 
-/// The points of an element and what λ weighs there, a row of n for each group of four points.
+/// The points of an element and the weights λ gives them, a row of n for each group of four points.
 #[derive(Clone, Debug, Default)]
 struct Places {
     times: Vec<Points>,
@@ -61,7 +66,7 @@ struct Places {
     v: Vec<Points>,
     momenta: Vec<Points>,
     forces: Vec<Points>,
-    /// What these weights make of velocities.
+    /// The contributions of these weights to those of velocities.
     by_velocities: Vec<Points>,
 }
 
@@ -74,10 +79,10 @@ impl<M> fmt::Debug for Backwards<'_, M> {
 }
 
 impl<'m, M: Model> Backwards<'m, M> {
-    /// At the end of a run with an element, with λ = 0.
+    /// The adjoint at the end of a run with this element, with λ = 0.
     ///
     /// # Errors
-    /// [`OperatorError`] where steps of this model are impossible.
+    /// [`OperatorError`] if this model cannot be stepped.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, OperatorError> {
         let table = TransitionOperator::admitted::<M>(model, element)?;
         let view = View::new(model, 0.0)?;
@@ -124,10 +129,10 @@ impl<'m, M: Model> Backwards<'m, M> {
         all.map(|index| self.tape.sum(index)).collect()
     }
 
-    /// Adds what the loss has directly of a node.
+    /// Adds the direct derivatives of the loss at a node.
     ///
     /// # Errors
-    /// [`OperatorError`]: vectors of other lengths, velocities that no momenta belong to.
+    /// [`OperatorError`] for vectors of other lengths, and for velocities to which no momenta belong.
     pub fn see(
         &mut self,
         t: f64,
@@ -142,7 +147,8 @@ impl<'m, M: Model> Backwards<'m, M> {
         Ok(())
     }
 
-    /// What the loss has of the state of a place, through outputs and velocities, too; what it has of parameters is added to their sums.
+    /// The derivatives of the loss by the state at a place, including those through outputs and velocities; the
+    /// derivatives by parameters are added to their sums.
     ///
     /// # Errors
     /// As [`see`](Self::see).
@@ -236,10 +242,11 @@ impl<'m, M: Model> Backwards<'m, M> {
         Ok(())
     }
 
-    /// The same where L_vv is singular: constraints leave one velocity, p = L_v(q, v) + Aᵀη, A v + a = 0 (T-74). What the rows have of coordinates and parameters is added.
+    /// The same where L_vv is singular and the constraints determine the velocity: p = L_v(q, v) + Aᵀη, A v + a = 0
+    /// (T-74). Adds the contributions of the rows of constraints to coordinates and parameters.
     ///
     /// # Errors
-    /// [`StepError::SingularTangent`] where there are none, or not enough.
+    /// [`StepError::SingularTangent`] where there are no constraints, or not enough.
     fn divide_by_bordered(
         &mut self,
         (t, q, v): (f64, &[f64], &[f64]),
@@ -281,7 +288,8 @@ impl<'m, M: Model> Backwards<'m, M> {
         Ok(())
     }
 
-    /// Goes back from behind an impulse to before it, of a model with constraints: `kicked` has the momentum with the impulse, before constraints take up what is against them.
+    /// Goes back over an impulse, of a model with constraints: `kicked` has the momentum with the impulse, before the
+    /// constraints take up the part against them.
     ///
     /// # Errors
     /// As [`Kick::of`].
@@ -293,10 +301,12 @@ impl<'m, M: Model> Backwards<'m, M> {
         Ok(())
     }
 
-    /// Goes back over the element from t to t + h, from where it ends to `before`, with what the loss has of its inside; where it has ended, solved once more.
+    /// Goes back over the element from t to t + h that begins at `before`, with the derivatives of the loss by its
+    /// inside; the element is solved once more.
     ///
     /// # Errors
-    /// [`OperatorError`], of the step and of its tangent; [`OperatorError::Cut`] where it was too long to be made at once.
+    /// [`OperatorError`] of the step and of its tangent; [`OperatorError::Cut`] if the step was too long to be made at
+    /// once.
     pub fn pass(
         &mut self,
         (t, h): (f64, f64),
@@ -351,7 +361,7 @@ impl<'m, M: Model> Backwards<'m, M> {
         Ok(end)
     }
 
-    /// The derivative of an element by its start, factored, with its points.
+    /// The derivative of an element by its start, with sparse factors and the points.
     fn transition(
         &mut self,
         (t, h): (f64, f64),
@@ -372,7 +382,7 @@ impl<'m, M: Model> Backwards<'m, M> {
         transition
     }
 
-    /// By iteration, with the points of the step that the stepper has made; false where that does not contract.
+    /// The adjoint of the step that the stepper has made, by iteration; false where it does not contract.
     fn iterate(&mut self, t: f64, h: f64, within: &Within) -> bool {
         let Some(iteration) = &mut self.iteration else {
             return false;
@@ -402,7 +412,7 @@ impl<'m, M: Model> Backwards<'m, M> {
         true
     }
 
-    /// Adds what momenta and forces at the points have of parameters.
+    /// Adds the derivatives of momenta and forces at the points by parameters.
     fn take_derivatives(&mut self) {
         let model = self.view.model();
         if model.parameters() == 0 {
@@ -433,7 +443,7 @@ impl<'m, M: Model> Backwards<'m, M> {
 }
 
 impl Places {
-    /// The place of a point; where there are no more points the first of its group stands.
+    /// Sets a point; unused lanes repeat the first point of their group.
     fn set(&mut self, l: usize, t: f64, q: &[f64], v: &[f64]) {
         let (group, n) = (l / 4, q.len());
         let lanes = match l % 4 {
@@ -447,7 +457,7 @@ impl Places {
         }
     }
 
-    /// What is weighed at the points.
+    /// Sets the weights at the points.
     fn weigh(&mut self, seeds: &Seeds) {
         let n = self.q.len() / self.times.len().max(1);
         for (rows, seeds) in [

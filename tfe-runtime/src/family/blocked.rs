@@ -1,4 +1,5 @@
-//! A sparse matrix of small dense blocks: places known once, ordered once, factored when asked.
+//! A sparse matrix of small dense blocks: its pattern is fixed, its elimination ordering is computed once, and it is
+//! factored on request.
 
 use crate::error::StepError;
 use alloc::vec;
@@ -8,20 +9,20 @@ use faer::linalg::solvers::Solve as _;
 use faer::sparse::linalg::solvers::{Lu, SymbolicLu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 
-/// Where a block stands: entry (i, j) of it is the value number `first + j · stride + i`.
+/// The place of a block: its entry (i, j) is the value number `first + j · stride + i`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) first: usize,
     pub(super) stride: usize,
 }
 
-/// A square matrix of b × b blocks, by columns. Unknowns are ordered by block, those of one block next to each other.
+/// A square matrix of b × b blocks, by columns. The unknowns of one block are next to each other.
 #[derive(Clone)]
 pub(super) struct Blocked {
     block: usize,
     /// (column, row) of the blocks, sorted.
     pairs: Vec<(usize, usize)>,
-    /// Where the pairs of each column begin.
+    /// Where the blocks of each column begin.
     starts: Vec<usize>,
     structure: SymbolicSparseColMat<usize>,
     symbolic: SymbolicLu<usize>,
@@ -39,7 +40,8 @@ impl fmt::Debug for Blocked {
 }
 
 impl Blocked {
-    /// `count` rows of blocks of size `block`, at the given (row, column); nothing where memory does not suffice for an ordering.
+    /// A matrix with `count` rows of blocks of size `block`, at the given (row, column); `None` where memory does not
+    /// suffice for the ordering.
     pub(super) fn new(count: usize, block: usize, places: &[(usize, usize)]) -> Option<Self> {
         let mut pairs: Vec<(usize, usize)> =
             places.iter().map(|(row, column)| (*column, *row)).collect();
@@ -78,7 +80,7 @@ impl Blocked {
         self.structure.ncols()
     }
 
-    /// Where the block of a row and a column stands, which must be among those the matrix was made with.
+    /// The place of the block of a row and a column, which must be one of those given at construction.
     pub(super) fn place(&self, row: usize, column: usize) -> Place {
         let at = self.pairs.binary_search(&(column, row)).unwrap_or(0);
         let (start, end) = (self.starts[column], self.starts[column + 1]);
@@ -89,20 +91,21 @@ impl Blocked {
         }
     }
 
-    /// Whether there are factors.
+    /// Whether the matrix has been factored.
     pub(super) fn is_factored(&self) -> bool {
         self.factors.is_some()
     }
 
-    /// Says that the factors serve no longer.
+    /// Declares the factors out of date.
     pub(super) fn forget(&mut self) {
         self.factors = None;
     }
 
-    /// Factors the values.
+    /// Factors the matrix.
     ///
     /// # Errors
-    /// [`StepError::NonFinite`], [`StepError::SingularTangent`]; the unknown at which elimination stopped is not told, and stands as the first.
+    /// [`StepError::NonFinite`], [`StepError::SingularTangent`]; the latter names unknown 0, because the factorisation
+    /// does not tell where it stopped.
     pub(super) fn factor(&mut self) -> Result<(), StepError> {
         self.factors = None;
         if !self.values.iter().all(|value| value.is_finite()) {
@@ -114,7 +117,8 @@ impl Blocked {
         Ok(())
     }
 
-    /// The solution in place of the right-hand side; unchanged without factors. A matrix that is singular by its numbers gives what is not finite.
+    /// Replaces a right-hand side by the solution; without factors it is unchanged. A numerically singular matrix gives
+    /// a result that is not finite.
     pub(super) fn solve(&self, vector: &mut [f64]) {
         if let Some(factors) = &self.factors {
             factors.solve_in_place(faer::ColMut::from_slice_mut(vector).as_mat_mut());

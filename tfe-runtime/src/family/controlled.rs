@@ -1,4 +1,4 @@
-//! Families with inputs: numbers given at run time.
+//! Models of run-time length with inputs, whose values are given at run time.
 
 use super::model::{Entries, Gradient, Model, Sweep};
 use crate::controlled::MAX_INPUTS;
@@ -6,8 +6,9 @@ use crate::real::Real;
 
 /// The kernels of a model of run-time length with inputs u: L(q, v, t, u) or H(q, p, t, u), forces Q(q, z, t, u) and observables.
 ///
-/// Implemented by `#[dynamics]` where `input(…)` stands; the model itself, as a [`Model`], is the one all of whose inputs are zero. Every kernel is that of [`Model`] with
-/// the inputs before its other arguments, in the order of [`INPUTS`](Self::INPUTS); entries beyond them are not read.
+/// `#[dynamics]` implements it for declarations with `input(…)`. The model itself, as a [`Model`], is the one all of
+/// whose inputs are zero. Each kernel is that of [`Model`] with the inputs as an additional argument before the others,
+/// in the order of [`INPUTS`](Self::INPUTS); further entries are not read.
 pub trait Controlled: Model + Send + Sync {
     /// The names of the inputs, in order.
     const INPUTS: &'static [&'static str];
@@ -68,7 +69,7 @@ pub trait Controlled: Model + Send + Sync {
         entries: &mut E,
     );
 
-    /// The observables, in order of declaration and of sites.
+    /// The observables, in the order of declaration and of sites.
     fn observables_with<R: Real>(
         &self,
         _inputs: &[R; MAX_INPUTS],

@@ -1,4 +1,4 @@
-//! The solution of a family between the nodes: integrated rates (T-69).
+//! Dense output of models of run-time length: the solution between the nodes as the integral of the rates (T-69).
 
 use super::model::FamilyState;
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
@@ -17,18 +17,19 @@ use alloc::vec::Vec;
 
 /// One element of a motion of a family, to be evaluated anywhere inside.
 ///
-/// Coordinates and momenta are polynomials that begin and end at the states of the nodes. 2 s n numbers for s stages and n coordinates.
+/// Coordinates and momenta are polynomials that begin and end at the states of the nodes. They take 2 s n numbers for s
+/// stages and n coordinates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DenseElement {
     times: (f64, f64),
-    /// Between the times: the step, whose digits their difference does not have far from zero.
+    /// The length of the step: far from t = 0 it has more correct digits than the difference of the times.
     length: f64,
     start: FamilyState,
     end: FamilyState,
     /// Legendre coefficients of h dq/dt, a row of n each.
     rates: Vec<f64>,
     momenta: Momenta,
-    /// Of an element that was cut: its pieces; else nothing.
+    /// The pieces of an element that was cut; empty otherwise.
     pieces: Vec<Self>,
 }
 
@@ -43,7 +44,7 @@ enum Momenta {
 }
 
 impl DenseElement {
-    /// Nothing happens.
+    /// An element with a constant state.
     pub(super) fn constant(times: (f64, f64), state: FamilyState) -> Self {
         Self {
             times,
@@ -56,7 +57,7 @@ impl DenseElement {
         }
     }
 
-    /// An element that was cut (T-116), from time `start` to time `end`.
+    /// An element that was cut (T-116), from time `start` to time `end`, made of its pieces.
     pub(super) fn of_pieces((start, end): (f64, f64), mut pieces: Vec<Self>) -> Option<Self> {
         pieces.first_mut()?.times.0 = start;
         pieces.last_mut()?.times.1 = end;
@@ -73,7 +74,8 @@ impl DenseElement {
         })
     }
 
-    /// From rates of coordinates at the unknowns and of momenta at the points, as functions of unknown (point) and coordinate.
+    /// An element from the rates of coordinates at the unknown nodes and of momenta at the points, given as functions
+    /// of unknown (or point) and coordinate.
     pub(super) fn of(
         scheme: &SchemeRef<'_>,
         times: (f64, f64),
@@ -95,7 +97,7 @@ impl DenseElement {
         }
     }
 
-    /// From rates and momenta at the points of a collocated element, where momenta jump at its ends (T-79).
+    /// An element from rates and momenta at the points of a collocated element whose momenta jump at its ends (T-79).
     #[cfg(feature = "sparse")]
     pub(super) fn with_jumps(
         scheme: &SchemeRef<'_>,
@@ -129,7 +131,7 @@ impl DenseElement {
         }
     }
 
-    /// Its pieces: the element itself, unless the step was [cut](crate::Statistics::cuts).
+    /// The pieces of the element: the element itself, unless the step was [cut](crate::Statistics::cuts).
     #[must_use]
     pub fn pieces(&self) -> &[Self] {
         if self.pieces.is_empty() {
@@ -139,14 +141,15 @@ impl DenseElement {
         }
     }
 
-    /// The degree of the coordinates: the number of points at which an element of collocation meets the equations of motion.
+    /// The degree of the coordinates: the number of points at which a collocation element satisfies the equations of
+    /// motion.
     #[must_use]
     pub fn degree(&self) -> usize {
         let piece = &self.pieces()[0];
         piece.rates.len() / piece.start.q.len().max(1)
     }
 
-    /// Bounds of what outputs of a `form` are functions of, all along an element of one [piece](Self::pieces), as
+    /// Bounds of the arguments of outputs of a `form`, along the whole of an element of one [piece](Self::pieces), as
     /// [`DenseElement::bounds`](crate::step::DenseElement::bounds).
     #[must_use]
     #[cfg(feature = "std")]
@@ -154,7 +157,8 @@ impl DenseElement {
         self.rows().bounds(form)
     }
 
-    /// Bounds over a part of an element of one [piece](Self::pieces), from τ to τ, and of the derivatives by τ.
+    /// Bounds of the arguments of outputs, and of their derivatives by τ, over a part from τ to τ of an element of one
+    /// [piece](Self::pieces).
     #[must_use]
     #[cfg(feature = "std")]
     pub fn bounds_over(&self, form: Form, part: (f64, f64)) -> LongArguments<Dual<Enclosure>> {
@@ -166,7 +170,7 @@ impl DenseElement {
     fn rows(&self) -> Rows<'_> {
         let forces = match &self.momenta {
             Momenta::Rates(rates) => &rates[..],
-            // Of Lagrangians alone, whose outputs are no functions of momenta.
+            // Only for Lagrangians, whose outputs do not depend on momenta.
             #[cfg(feature = "sparse")]
             Momenta::Values(_) => &[],
         };
@@ -192,7 +196,7 @@ impl DenseElement {
         self.times.1
     }
 
-    /// How long it is, as [`DenseElement::length`](crate::step::DenseElement::length).
+    /// The length of the element, as [`DenseElement::length`](crate::step::DenseElement::length).
     #[must_use]
     pub fn length(&self) -> f64 {
         self.length
@@ -236,7 +240,7 @@ impl DenseElement {
         state
     }
 
-    /// Coordinates and velocities at a place τ of an element that was not cut, h long.
+    /// Coordinates and velocities at a place τ of an element of length h that was not cut.
     #[cfg(feature = "sparse")]
     pub(super) fn motion_at(&self, tau: f64, h: f64) -> (Vec<f64>, Vec<f64>) {
         let (mut values, mut integrals) = ([0.0; MAX_NODES], [0.0; MAX_NODES]);
@@ -268,7 +272,7 @@ impl DenseElement {
         velocity
     }
 
-    /// The piece of an element that was cut.
+    /// The piece of an element that was cut that contains this time.
     fn piece_at(&self, time: f64) -> Option<&Self> {
         piece_at(&self.pieces, |piece| piece.times.0, self.times, time)
     }
@@ -292,8 +296,8 @@ fn coefficients(
     rows
 }
 
-/// What takes momenta at the points, at the start and at the end to the Legendre coefficients of dp/dτ of the polynomial through them, where momenta jump at the ends (T-79): a row of points + 2 for
-/// each coefficient.
+/// The matrix from momenta at the points, at the start and at the end to the Legendre coefficients of dp/dτ of the
+/// polynomial through them, where momenta jump at the ends (T-79): a row of points + 2 for each coefficient.
 #[cfg(feature = "sparse")]
 pub(super) fn jumps(scheme: &SchemeRef<'_>) -> Vec<f64> {
     let (points, s) = (scheme.points(), scheme.rates());

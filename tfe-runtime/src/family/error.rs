@@ -1,9 +1,9 @@
-//! What is wrong with a model of run-time length, or with what it was asked for.
+//! The errors of models of run-time length, and of what is requested of them.
 
 use crate::element::{Element, ElementError};
 use core::fmt;
 
-/// Lengths that do not belong together, and what families cannot do yet.
+/// Why a model of run-time length is inconsistent, or not supported.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ModelError {
@@ -12,14 +12,14 @@ pub enum ModelError {
         /// The array as declared, `q[n]`.
         array: &'static str,
     },
-    /// A length beyond 2⁴⁰, of which no array has so many elements.
+    /// A length beyond 2⁴⁰, which no array can have.
     Length {
         /// The field.
         field: &'static str,
         /// Its value.
         length: usize,
     },
-    /// A sum over nothing, or a constraint or an output of no site.
+    /// A sum over an empty range, or a constraint or an output without sites.
     EmptyRange {
         /// The range of the sum, `i in 0..n-1`; of a constraint or an output, the declaration, `constraint(rod[i in 0..n-1])`.
         ranges: &'static str,
@@ -28,7 +28,7 @@ pub enum ModelError {
         /// One past its last value.
         end: i64,
     },
-    /// An index outside of its array.
+    /// An index outside its array.
     Index {
         /// The array.
         array: &'static str,
@@ -36,12 +36,12 @@ pub enum ModelError {
         index: &'static str,
         /// The ranges of the sums that it depends on, after the constraint or output that it stands in.
         ranges: &'static str,
-        /// The first value that is outside.
+        /// The first value outside the array.
         value: i64,
         /// The length of the array.
         length: usize,
     },
-    /// An entry of a list of indices that makes an index lie outside of its array.
+    /// An entry of a list of indices that leads to an index outside its array.
     ListEntry {
         /// The list.
         list: &'static str,
@@ -58,13 +58,13 @@ pub enum ModelError {
         /// The length of the array.
         length: usize,
     },
-    /// An array field that is not as long as its indices ask for.
+    /// An array field that is shorter or longer than its indices require.
     FieldLength {
         /// The field.
         field: &'static str,
         /// Its length.
         length: usize,
-        /// The length that its largest index asks for.
+        /// The length required by its largest index.
         expected: i64,
         /// That index as declared.
         index: &'static str,
@@ -80,14 +80,14 @@ pub enum ModelError {
         /// The number of coordinates.
         expected: usize,
     },
-    /// ∂²/∂z∂z has an entry off its diagonal, or varies: not supported yet.
+    /// ∂²/∂z∂z has an entry off its diagonal, or is not constant: not supported yet.
     MassNotDiagonal {
         /// The row of the entry.
         row: usize,
         /// The column of the entry.
         column: usize,
     },
-    /// The kinetic energy does not hold one of the velocities: no velocity belongs to a momentum.
+    /// The kinetic energy does not depend on one of the velocities: no velocity belongs to a momentum.
     SingularMass {
         /// The coordinate.
         coordinate: usize,
@@ -96,24 +96,24 @@ pub enum ModelError {
     NoVelocity,
     /// The equations are not of the form M q̈ = f with a constant diagonal M: not supported yet.
     NotSecondOrder,
-    /// The element does not exist.
+    /// The element is invalid.
     Element(ElementError),
     /// The element is not a Runge–Kutta method of at most 16 points for this model.
     ElementNotSupported {
         /// The element.
         element: Element,
     },
-    /// Newton's method was asked for, but the feature `sparse` is off.
+    /// Newton's method was requested, but the feature `sparse` is off.
     NoNewton,
-    /// The fixed-point iteration was asked for, but the model is solved by Newton's method.
+    /// The fixed-point iteration was requested, but the model can only be solved by Newton's method.
     NeedsNewton,
-    /// Constraints without the feature `sparse`, or of a Hamiltonian.
+    /// There are constraints, but the feature `sparse` is off or the model is a Hamiltonian.
     ConstraintsNotSupported,
-    /// No ordering of its equations fits into memory.
+    /// The elimination ordering of its equations does not fit into memory.
     TooLarge,
 }
 
-/// What is said before the place of an index: a declaration has parentheses, ranges of sums have none.
+/// The words before the place of an index: a declaration has parentheses, ranges of sums have none.
 fn sum_over(ranges: &str) -> &'static str {
     match ranges.contains('(') {
         true => "",

@@ -1,4 +1,5 @@
-//! Steps of families whose forces are the unknowns: M q̈ = f(q, q̇, t) with a constant diagonal M.
+//! The stepper of models of run-time length whose forces are the unknowns: M q̈ = f(q, q̇, t) with a constant diagonal
+//! M.
 
 use super::dense::DenseElement;
 use super::error::ModelError;
@@ -22,7 +23,7 @@ use crate::statistics::{Contraction, Statistics};
 use alloc::vec;
 use core::ops::Deref;
 
-/// A stepper of this kind: a fixed-point iteration, and where that contracts badly Newton's method.
+/// A fixed-point iteration and, where that contracts badly, Newton's method.
 #[derive(Clone, Debug)]
 pub(super) struct Forces<M> {
     model: M,
@@ -34,7 +35,7 @@ pub(super) struct Forces<M> {
     preference: Preference,
     #[cfg(feature = "sparse")]
     tangent: Option<Tangent>,
-    /// Time, length and ends of the last step.
+    /// Time and length of the last step.
     last: Option<(f64, f64)>,
     start: FamilyState,
     end: FamilyState,
@@ -43,7 +44,7 @@ pub(super) struct Forces<M> {
 }
 
 impl<M> Forces<M> {
-    /// The same memory for another holder of the model, with nothing counted yet.
+    /// The same memory with the model held in another way, and all counts zero.
     pub(super) fn hand_over<H>(self, model: H) -> Forces<H> {
         Forces {
             model,
@@ -65,10 +66,10 @@ impl<M> Forces<M> {
 }
 
 impl<M: Model, H: Deref<Target = M>> Forces<H> {
-    /// A stepper at rest; the model has been checked.
+    /// A stepper that has made no step; the model has been checked.
     ///
     /// # Errors
-    /// [`ModelError`]: a kinetic energy that is not ½ Σ m v², Newton's method without the feature for it.
+    /// [`ModelError`] for a kinetic energy that is not ½ Σ m v², and for Newton's method without the feature for it.
     pub(super) fn new(model: H, table: SchemeTable, control: Control) -> Result<Self, ModelError> {
         if control.solve == Solve::Newton && !cfg!(feature = "sparse") {
             return Err(ModelError::NoNewton);
@@ -102,7 +103,7 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
         })
     }
 
-    /// The next step continues none.
+    /// Makes the next step start without continuing the last one.
     pub(super) fn forget(&mut self) {
         self.last = None;
     }
@@ -111,13 +112,13 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
         &self.table
     }
 
-    /// Whether the last step ended there.
+    /// Whether the last step ended at this state.
     pub(super) fn ends_in(&self, state: &FamilyState) -> bool {
         self.last.is_some() && self.end == *state
     }
 
-    /// As [`Stepper::advance`](super::Stepper::advance), for a state that is finite and as long as the model; `continues` where the last
-    /// step ended there.
+    /// As [`Stepper::advance`](super::Stepper::advance), for a state that is finite and as long as the model;
+    /// `continues` tells whether the last step ended there.
     pub(super) fn advance(
         &mut self,
         t: f64,
@@ -147,7 +148,7 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
         Ok(())
     }
 
-    /// The equations of one element: the fixed point while it contracts well, else Newton's method.
+    /// Solves the equations of one element: by fixed-point iteration while it contracts well, else by Newton's method.
     fn solve(&mut self, t: f64, h: f64, is_warm: bool) -> Result<(), StepError> {
         let solve = self.control.solve;
         let yielding = cfg!(feature = "sparse") && solve != Solve::FixedPoint;
@@ -182,7 +183,7 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
                 return Ok(());
             }
         }
-        // The continued polynomial may be a worse start than none.
+        // The extrapolated polynomial may be a worse initial guess than a cold start.
         self.prepare(t, h, false);
         #[cfg(feature = "sparse")]
         self.registers.release();
@@ -202,11 +203,12 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
 
     #[cfg(not(feature = "sparse"))]
     fn newton(&mut self, _: f64, _: f64) -> Result<(), StepError> {
-        // Refused when the stepper is made.
+        // This is refused when the stepper is made.
         Err(StepError::NonFinite)
     }
 
-    /// Newton's method; the factors are kept while they serve, also from step to step.
+    /// Simplified Newton iteration; the sparse factors are kept while they contract well enough, also from step to
+    /// step.
     #[cfg(feature = "sparse")]
     fn newton(&mut self, t: f64, h: f64) -> Result<(), StepError> {
         let mut tangent = match self.tangent.take() {
@@ -275,11 +277,11 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
                 }
             }
             if outcome.converged {
-                // The matrix of a root that is refused proves none that is looked for from it.
+                // Factors from a refused root are no evidence for a root that is found with them.
                 let proof = evidence.check(self.control.solve);
                 return proof.map(|()| outcome).inspect_err(|_| tangent.forget());
             }
-            // The first increment alone tells no rate: an old matrix may show a second one.
+            // The first increment alone gives no rate: old factors are allowed a second one.
             let untried = known && outcome.iterations == 1;
             fresh = !untried && monitor.rate() > SERVES;
             if monitor.is_stuck() {

@@ -1,4 +1,5 @@
-//! What constraints add to the derivative of an element of run-time length: by its start, by parameters, and backwards (T-160).
+//! The contributions of constraints to the derivative of an element of run-time length: by its start, by parameters,
+//! and of its adjoint (T-160).
 
 use super::model::Model;
 use super::node::Node;
@@ -35,19 +36,19 @@ pub(super) struct Held {
     end: Projection,
 }
 
-/// The step that was solved, as far as constraints matter.
+/// The parts of a solved step that the constraints need.
 pub(super) struct Solved<'a> {
     pub(super) scheme: &'a SchemeRef<'a>,
-    /// The places of second derivatives of the model.
+    /// The sparsity pattern of the second derivatives of the model.
     pub(super) second: &'a Pattern,
     pub(super) t: f64,
     pub(super) h: f64,
     pub(super) points: &'a [point::Point],
-    /// Of each constraint, one for each unknown rate.
+    /// The multipliers of each constraint, one for each unknown rate.
     pub(super) multipliers: &'a [f64],
     /// Coordinates at the start.
     pub(super) start: &'a [f64],
-    /// Coordinates and velocities at the end, where the node has been solved.
+    /// The coordinates and velocities at the end, after the solution at the node.
     pub(super) end: (&'a [f64], &'a [f64]),
     /// A at the start, and the rows at the end.
     pub(super) start_rows: &'a [f64],
@@ -63,12 +64,13 @@ impl Solved<'_> {
     }
 }
 
-/// What a row λ of phase space weighs of constraints, times which derivatives by parameters are to be added.
+/// The weights that a row λ of phase space gives to the constraints; multiplied by the derivatives of these by
+/// parameters, they are added to the sums.
 #[derive(Clone, Debug)]
 pub(super) struct Weights {
     /// φ at the points, a row for each.
     pub(super) phi: Vec<f64>,
-    /// A₀, and A at the points, a row for each: by place.
+    /// A₀, and A at the points, a row for each, in the order of the pattern.
     pub(super) start_rows: Vec<f64>,
     pub(super) rows: Vec<f64>,
     /// Coordinates at the start.
@@ -77,10 +79,10 @@ pub(super) struct Weights {
 }
 
 impl Held {
-    /// Of the step that was solved last; the rows stand at its end.
+    /// For the step that was solved last; the rows are those at its end.
     ///
     /// # Errors
-    /// [`StepError`] where the matrix of the node is singular.
+    /// [`StepError`] if the matrix of the node is singular.
     pub(super) fn of<M: Model>(
         model: &M,
         places: &Arc<Places>,
@@ -110,7 +112,7 @@ impl Held {
         })
     }
 
-    /// What a parameter changes; forces at the points take up what it changes of reactions there.
+    /// The direct effect of a parameter; changes of the reactions are added to the forces at the points.
     pub(super) fn explicit<M: Model>(
         &self,
         model: &M,
@@ -142,7 +144,7 @@ impl Held {
         explicit
     }
 
-    /// What coordinates at the start make of the impulse there.
+    /// The effect of the coordinates at the start on the impulse there.
     pub(super) fn impulse_of(&self, q: &[f64]) -> Explicit {
         let mut impulse = vec![0.0; q.len()];
         self.places
@@ -151,21 +153,21 @@ impl Held {
         Explicit::impulse(impulse)
     }
 
-    /// Takes from the momentum at the start what the impulse there has without its multipliers.
+    /// Subtracts from the momentum at the start the change of the impulse there at fixed multipliers.
     pub(super) fn subtract_impulse(&self, explicit: Option<&Explicit>, p: &mut [f64]) {
         if let Some(explicit) = explicit {
             add_multiple(p, -1.0, &explicit.impulse);
         }
     }
 
-    /// What coordinates at point l make of the force of reactions there.
+    /// Adds the effect of the coordinates at point l on the reactions there.
     pub(super) fn bend(&self, l: usize, q: &[f64], force: &mut [f64]) {
         self.places
             .bends
             .add_product(&self.points[l].bend, -1.0, q, force);
     }
 
-    /// What multipliers make of forces at point l.
+    /// Adds the effect of the multipliers on the forces at point l.
     pub(super) fn add_reactions(&self, l: usize, multipliers: &[f64], force: &mut [f64]) {
         let point = &self.points[l];
         let count = multipliers.len() / self.places.count.max(1);
@@ -179,7 +181,7 @@ impl Held {
             .add_transposed(&point.rows, -1.0, &rates, force);
     }
 
-    /// What multipliers make of the momentum that the element begins with: h A₀ᵀ m₀.
+    /// Adds the effect of the multipliers on the initial momentum of the element: h A₀ᵀ m₀.
     pub(super) fn add_first_multipliers(&self, h: f64, multipliers: &[f64], p: &mut [f64]) {
         let count = multipliers.len() / self.places.count.max(1);
         let first = multipliers.chunks_exact(count.max(1)).map(|own| own[0]);
@@ -189,7 +191,7 @@ impl Held {
             .add_transposed(&self.start_rows, -h, &first, p);
     }
 
-    /// What coordinates at point l, and what moves φ besides, leave of the equations φ = 0.
+    /// Adds the right-hand sides of the equations φ = 0 from the coordinates at point l, and from direct changes of φ.
     pub(super) fn add_constraint_sides(
         &self,
         l: usize,
@@ -234,13 +236,13 @@ impl Held {
         }
     }
 
-    /// Takes from the momentum that arrives at the end what constraints take up.
+    /// Subtracts from the momentum that arrives at the end the part that the constraints take up.
     pub(super) fn project(&self, p: &mut [f64], q: &[f64], explicit: Option<&Explicit>) {
         self.end.apply(&self.places, p, q, explicit);
     }
 }
 
-/// Backwards.
+/// The adjoint operations.
 impl Held {
     /// Takes λ from after the node at the end to before it.
     pub(super) fn pull_projection(&self, of_p: &mut [f64], of_q: &mut [f64]) -> Weights {
@@ -254,7 +256,7 @@ impl Held {
         }
     }
 
-    /// What a row times the forces at point l is of multipliers.
+    /// Adds the product of a row with the forces at point l, as a function of the multipliers.
     pub(super) fn pull_reactions(&self, l: usize, force: &[f64], sides: &mut [f64]) {
         let point = &self.points[l];
         let count = sides.len() / self.places.count.max(1);
@@ -269,7 +271,7 @@ impl Held {
         }
     }
 
-    /// What λ is of the first multipliers.
+    /// Adds the contribution of λ to the first multipliers.
     pub(super) fn pull_first_multipliers(&self, h: f64, of_p: &[f64], sides: &mut [f64]) {
         let count = sides.len() / self.places.count.max(1);
         let mut of_first = vec![0.0; self.places.count];
@@ -281,7 +283,8 @@ impl Held {
         }
     }
 
-    /// What the solution `mu` of the transposed equations weighs of φ, and with it of coordinates at point l.
+    /// Adds the weights that the solution `mu` of the adjoint equations gives to φ, and thereby to the coordinates at
+    /// point l.
     pub(super) fn pull_constraint_sides(
         &self,
         l: usize,
@@ -319,14 +322,14 @@ impl Held {
             .add_transposed(&self.end.rows, 1.0, own, by_q);
     }
 
-    /// What λ before the impulse at the start is of coordinates there.
+    /// Adds the contribution of λ before the impulse at the start to the coordinates there.
     pub(super) fn pull_impulse(&self, of_p: &[f64], by_q: &mut [f64]) {
         self.places
             .bends
             .add_product(&self.start_bend, -1.0, of_p, by_q);
     }
 
-    /// What λ weighs of the entries of A at the start and at the points: of h A₀ᵀm₀ and Aᵀμ̇.
+    /// Adds the weights that λ gives to the entries of A at the start and at the points, through h A₀ᵀm₀ and Aᵀμ̇.
     pub(super) fn weigh_rows(&self, of_p: &[f64], forces: &[f64], weights: &mut Weights) {
         let n = of_p.len();
         let places = || self.places.rows.places().iter();

@@ -1,4 +1,4 @@
-//! Mass matrices of families.
+//! Mass matrices of models of run-time length, and their Legendre transform.
 
 use super::error::ModelError;
 use super::model::{Block, Entries, FamilyState, Model, slope};
@@ -16,7 +16,7 @@ pub(super) struct Inertia {
     pub(super) mass: Vec<f64>,
     /// 1/m
     pub(super) inverse: Vec<f64>,
-    /// What rounding took from 1/m.
+    /// The rounding error of 1/m.
     pub(super) inverse_low: Vec<f64>,
 }
 
@@ -54,13 +54,13 @@ impl Inertia {
     }
 }
 
-/// What takes velocities to momenta of a Hamiltonian, and momenta to velocities of a Lagrangian.
+/// Converts velocities to momenta of a Hamiltonian, and momenta to velocities of a Lagrangian.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Legendre {
-    /// Made when it is needed: for mass matrices that are not diagonal.
+    /// For mass matrices that are not diagonal; made on first use.
     #[cfg(feature = "sparse")]
     node: Option<Node>,
-    /// Where these are singular, with constraints.
+    /// For singular mass matrices with constraints.
     #[cfg(feature = "sparse")]
     instant: Option<Instant>,
 }
@@ -79,7 +79,7 @@ impl Legendre {
         let own = self.other(model, t, &state.q, &state.p);
         #[cfg(feature = "sparse")]
         if M::CONSTRAINED && own.is_err() {
-            // A momentum alone has no velocity, as that of a unit quaternion: constraints leave one.
+            // The momentum alone does not determine the velocity, as for a unit quaternion: the constraints do.
             let instant = match &mut self.instant {
                 Some(instant) => instant,
                 empty => empty.insert(Instant::new(model).ok_or(ModelError::TooLarge)?),
@@ -89,9 +89,9 @@ impl Legendre {
         own
     }
 
-    /// The momentum that belongs to a velocity of a Hamiltonian, or the velocity that belongs to a momentum of a Lagrangian: one step of
-    /// Newton's method, from zero, where the energy is quadratic with a diagonal mass matrix; else (with the feature `sparse`) as many as
-    /// it takes.
+    /// The momentum that belongs to a velocity of a Hamiltonian, or the velocity that belongs to a momentum of a
+    /// Lagrangian. Where the energy is quadratic with a diagonal mass matrix, this is one step of Newton's method from
+    /// zero; otherwise (with the feature `sparse`) as many as it takes.
     pub(super) fn other<M: Model>(
         &mut self,
         model: &M,
@@ -135,7 +135,7 @@ impl Legendre {
         let mut z = vec![0.0; model.len()];
         node.solve(model, (t, q), wanted, &free, &mut z)
             .map_err(|_| ModelError::NoVelocity)?;
-        // Where constraints hold the motion the matrix may be singular up to roundings.
+        // Where constraints determine the motion, the matrix may be singular up to rounding.
         match M::CONSTRAINED && !node.is_regular() {
             true => Err(ModelError::NoVelocity),
             false => Ok(z),
@@ -154,7 +154,7 @@ impl Legendre {
     }
 }
 
-/// The diagonal of ∂²/∂z∂z, of which nothing may be zero, and which may be all there is.
+/// The diagonal of ∂²/∂z∂z; fails if one of its entries is zero, or if there are entries off the diagonal.
 fn diagonal<M: Model>(model: &M, t: f64, q: &[f64], z: &[f64]) -> Result<Vec<f64>, ModelError> {
     let mut found = Diagonal {
         entries: vec![0.0; model.len()],

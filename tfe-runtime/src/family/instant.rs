@@ -1,4 +1,4 @@
-//! What constraints of a family do at one instant: velocities that they allow, and their reactions.
+//! Constraints of a model of run-time length at one instant: admissible velocities, and reactions.
 
 use super::error::ModelError;
 use super::model::{Block, Entries, FamilyState, Gradient, Model};
@@ -9,7 +9,7 @@ use crate::error::StepError;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The bordered matrix of an instant, ordered once.
+/// The bordered matrix of one instant, whose elimination ordering is computed once.
 #[derive(Clone, Debug)]
 pub(super) struct Instant {
     rows: Rows,
@@ -17,7 +17,7 @@ pub(super) struct Instant {
 }
 
 impl Instant {
-    /// Nothing where memory does not suffice; the model has been checked.
+    /// `None` where memory does not suffice; the model has been checked.
     pub(super) fn new<M: Model>(model: &M) -> Option<Self> {
         let rows = Rows::new(model);
         let node = Node::new(model, &rows)?;

@@ -1,4 +1,5 @@
-//! The one thing that the iteration of families asks of a model, so that everything else is compiled once, not once a model.
+//! The only call that the iteration of models of run-time length makes to a model, so that everything else is compiled
+//! once and not for every model.
 
 use super::model::Model;
 use super::running::Running;

@@ -1,4 +1,4 @@
-//! The derivative of what constraints leave of a momentum that an impulse was added to (T-160).
+//! The derivative of the momentum after an impulse under constraints (T-160).
 
 use super::error::ModelError;
 use super::model::{FamilyState, Model};
@@ -11,13 +11,15 @@ use super::view::View;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The derivative of (p̃, q) ↦ (p, q), where constraints take up at once what is against them:
+/// The derivative of (p̃, q) ↦ (p, q) at an impulse, where the constraints at once take up the part of the momentum
+/// that is against them:
 ///
 /// ```text
 /// p = p̃ − Aᵀη = L_v(q, v, t) ,     A v + a = 0                                                         (T-74)
 /// ```
 ///
-/// n coordinates take an n + m square sparse matrix, factored once; [`apply`](Self::apply) is one solution with it. Runs with derivatives across impulses use it (`Simulation::run_sensitive` of the crate `tfe`).
+/// For n coordinates and m constraints, a square sparse matrix of size n + m is factored once; [`apply`](Self::apply)
+/// is one solve with it. Runs with derivatives across impulses use it (`Simulation::run_sensitive` of the crate `tfe`).
 #[derive(Clone, Debug)]
 pub struct Kick {
     places: Places,
@@ -26,7 +28,8 @@ pub struct Kick {
 }
 
 impl Kick {
-    /// At a time, for coordinates and the momentum p̃; with the derivatives by some parameters, by their numbers. The model has constraints.
+    /// At a time, for coordinates and the momentum p̃, with the derivatives by the parameters of these indices. The
+    /// model has constraints.
     ///
     /// # Errors
     /// [`OperatorError`] where no velocity belongs to the momentum.
@@ -56,19 +59,19 @@ impl Kick {
         })
     }
 
-    /// Writes (δp, δq) for (δp̃, δq): numbers ordered (p, q).
+    /// Replaces (δp̃, δq) by (δp, δq), ordered (p, q).
     pub fn apply(&self, change: &mut [f64]) {
         let (p, q) = change.split_at_mut(self.projection.velocity().len());
         self.projection.apply(&self.places, p, q, None);
     }
 
-    /// ∂p/∂a, one for each parameter that was asked for.
+    /// ∂p/∂a, one for each requested parameter.
     #[must_use]
     pub fn by_parameters(&self) -> &[Vec<f64>] {
         &self.by_parameters
     }
 
-    /// Writes a row of phase space times the derivative for that row.
+    /// Replaces a row of phase space by its product with the derivative.
     pub(super) fn pull(&self, lambda: &mut [f64]) -> NodeWeights {
         let (of_p, of_q) = lambda.split_at_mut(self.projection.velocity().len());
         self.projection.pull(&self.places, of_p, of_q)

@@ -1,9 +1,9 @@
-//! Arithmetic of the iteration of families.
+//! Arithmetic of the fixed-point iteration of models of run-time length.
 
 use crate::registers::four::Four;
 use crate::registers::storage::{Heap, Matrix};
 
-/// The forces at one coordinate at all points, times a number.
+/// The forces on one coordinate at all points, times a factor.
 #[inline(always)]
 pub(super) fn at_points<V: Four, const G: usize>(
     forces: &[V],
@@ -18,7 +18,7 @@ pub(super) fn at_points<V: Four, const G: usize>(
     values
 }
 
-/// For each group of points the columns of a matrix, zeros beyond the last.
+/// The columns of a matrix for each group of points, with zeros beyond the last point.
 #[inline(always)]
 pub(super) fn rows<V: Four, const G: usize>(like: V, matrix: &Matrix<Heap>) -> [[[V; 4]; G]; G] {
     let mut rows = [[[like.like(0.0); 4]; G]; G];

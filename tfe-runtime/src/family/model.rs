@@ -1,4 +1,4 @@
-//! What a generated family gives the runtime.
+//! The interface between a generated model of run-time length and the runtime.
 
 use super::error::ModelError;
 use crate::input::{InputFailure, InputPanicked};
@@ -17,27 +17,28 @@ pub struct FamilyState {
     pub p: Vec<f64>,
 }
 
-/// Where a kernel writes first derivatives: slices as long as the model.
+/// The memory into which a kernel writes first derivatives: slices as long as the model.
 #[derive(Debug)]
 pub struct Gradient<'a, R> {
     /// L_v, or H_p.
     pub z: &'a mut [R],
     /// L_q, or H_q.
     pub q: &'a mut [R],
-    /// Generalized force Q; written only where [`Facts::forced`] says so.
+    /// Generalized force Q; written only if [`Facts::forced`].
     pub force: &'a mut [R],
 }
 
-/// What a kernel of forces works on: it lends slices, and hears how far the kernel has come.
+/// Lends slices to a kernel of forces, and is told how far the kernel has come.
 pub trait Sweep<R> {
-    /// Coordinates, velocities or momenta, and the places of L_q (or H_q) and Q; that of L_v is empty.
+    /// Coordinates, velocities or momenta, and the memory for L_q (or H_q) and Q; that for L_v is empty.
     fn slices(&mut self) -> (&[R], &[R], Gradient<'_, R>);
 
-    /// The kernel neither reads nor writes below this coordinate any more.
+    /// From now on, the kernel neither reads nor writes below this coordinate.
     fn passed(&mut self, below: usize);
 }
 
-/// Sites between two words of a kernel about how far it has come: so few that slices of so many sites stay in a cache, so many that a word costs nothing.
+/// The number of sites between two calls of [`Sweep::passed`]: so few that their slices stay in a cache, so many that
+/// the calls cost nothing.
 pub const STRIDE: usize = 1024;
 
 /// The blocks of second derivatives; z stands for velocities or momenta.
@@ -59,7 +60,8 @@ pub enum Block {
     Bend,
 }
 
-/// Takes second derivatives as a kernel computes them: contributions to entries, in an order that depends on lengths alone.
+/// Receives second derivatives as a kernel computes them: contributions to entries, in an order that depends on lengths
+/// alone.
 pub trait Entries<R> {
     /// Adds to one entry of one block.
     fn add(&mut self, block: Block, row: usize, column: usize, value: R);
@@ -67,14 +69,15 @@ pub trait Entries<R> {
 
 /// The kernels of a model of run-time length.
 ///
-/// Implemented by `#[dynamics]` for models with `coordinates(q[n])`, n a field of type `usize`. All slices are as long as the model. Kernels may be
-/// called after [`check`](Self::check) has succeeded; before, they may panic or leave results out.
+/// `#[dynamics]` implements it for models with `coordinates(q[n])`, where n is a field of type `usize`. All slices are
+/// as long as the model. Kernels may be called after [`check`](Self::check) has succeeded; before that, they may panic
+/// or give incomplete results.
 pub trait Model: Declared<0, Length = RunTimeLength> {
-    /// By which function it was declared.
+    /// The function by which it was declared.
     const FORM: Form;
     /// What is known about its structure.
     const FACTS: Facts;
-    /// Whether ∂/∂z of the energy function holds the time.
+    /// Whether ∂/∂z of the energy function depends on the time.
     const MOMENTA_MOVE: bool;
 
     /// The number of coordinates.
@@ -85,10 +88,10 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         self.len() == 0
     }
 
-    /// Whether lengths, ranges and array fields belong together.
+    /// Checks that lengths, ranges and array fields are consistent.
     ///
     /// # Errors
-    /// [`ModelError`] names the array, the sum and the index.
+    /// [`ModelError`], which names the array, the sum and the index.
     fn check(&self) -> Result<(), ModelError>;
 
     /// L(q, v, t), or H(q, p, t).
@@ -97,15 +100,16 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
     /// Its first derivatives, and the generalized force.
     fn first<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>);
 
-    /// Whether [`forces_inline`](Self::forces_inline) writes every place of L_q, whatever was there.
+    /// Whether [`forces_inline`](Self::forces_inline) assigns every entry of L_q, whatever its value was.
     const ASSIGNS: bool = false;
 
-    /// L_q (or H_q) and Q alone, into slices that hold zeros (but L_q with [`ASSIGNS`](Self::ASSIGNS)): whoever reads them last sets them to zero while they are at hand. Written into
-    /// the place of the call, so that it is compiled for the instruction set of that place.
+    /// L_q (or H_q) and Q alone, added to slices that contain zeros (except L_q with [`ASSIGNS`](Self::ASSIGNS)): the
+    /// last reader of the slices sets them to zero while they are in the cache. Inlined into its caller, so that it is
+    /// compiled for the instruction set of the caller.
     fn forces_inline<R: Real>(&self, t: R, q: &[R], z: &[R], first: Gradient<'_, R>);
 
-    /// The same on slices that are lent, with a word now and then about how far it has come: where more sites than [`STRIDE`] are run through in one
-    /// loop.
+    /// The same on lent slices, with a report now and then of how far it has come, for loops over more than [`STRIDE`]
+    /// sites.
     #[inline(always)]
     fn forces_in_strides<R: Real, S: Sweep<R>>(&self, t: R, sweep: &mut S) {
         let (q, z, first) = sweep.slices();
@@ -131,9 +135,10 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
     /// Whether there are constraints: holonomic ones, φ(q, t) = 0.
     const CONSTRAINED: bool = false;
 
-    /// The number of constraints, each a row of A.
+    /// The number of constraints, each of which is a row of A.
     ///
-    /// They are numbered in order of declaration; one by site has its rows in order of the sites.
+    /// They are numbered in the order of declaration; a constraint declared by site has its rows in the order of the
+    /// sites.
     ///
     /// ```text
     /// row = rows of the declarations before it + (i − start)
@@ -142,15 +147,16 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         0
     }
 
-    /// The name of a constraint: `rod[0]`, `rod[1]`, …, or `rod` of a single one.
+    /// The name of a constraint: `rod[0]`, `rod[1]`, …, or `rod` for a single one.
     fn constraint_name(&self, row: usize) -> CoordinateName {
         CoordinateName::element("", row)
     }
 
-    /// φ(q, t), one value a row.
+    /// φ(q, t), one value for each row.
     fn constraint_values<R: Real>(&self, _t: R, _q: &[R], _values: &mut [R]) {}
 
-    /// The contributions to A = ∂φ/∂q in [`Block::Row`], and a = ∂φ/∂t in `drift`, one value a row: zero where the time does not appear.
+    /// The contributions to A = ∂φ/∂q as [`Block::Row`], and a = ∂φ/∂t in `drift`, one value for each row: zero where
+    /// the time does not appear.
     fn constraint_rows<R: Real, E: Entries<R>>(
         &self,
         _t: R,
@@ -160,7 +166,8 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
     ) {
     }
 
-    /// The contributions to Σ μ ∂²φ/∂q∂q in [`Block::Bend`], those on both sides of the diagonal; one multiplier μ a row.
+    /// The contributions to Σ μ ∂²φ/∂q∂q as [`Block::Bend`], on both sides of the diagonal, with one multiplier μ for
+    /// each row.
     fn constraint_second<R: Real, E: Entries<R>>(
         &self,
         _t: R,
@@ -170,13 +177,16 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
     ) {
     }
 
-    /// What kernels read beside the [parameters](Self::parameters), in the order of the struct: fields that are lengths, lists of indices, and how many entries lists and vectors have. No model goes on
-    /// where one was suspended that differs in it. Nothing for models of hand-written kernels that do not say.
+    /// Passes to `values` what kernels read besides the [parameters](Self::parameters), in the order of the struct:
+    /// fields that are lengths, lists of indices, and the numbers of entries of lists and vectors. A suspended run
+    /// cannot be resumed with a model that differs in these values. Models with hand-written kernels need not pass
+    /// anything.
     fn unnumbered<F: FnMut(u64)>(&self, _values: &mut F) {}
 
-    /// The number of parameters: fields that are numbers, and the elements of fields that are arrays or vectors of numbers, in the order of the struct. Zero for models of
-    /// hand-written kernels that do not say. [`first`](Self::first) and [`observables`](Self::observables) of those that do make each parameter by [`Real::parameter`], so that
-    /// numbers may carry derivatives by it.
+    /// The number of parameters: fields that are numbers, and the elements of fields that are arrays or vectors of
+    /// numbers, in the order of the struct. Zero for models with hand-written kernels that do not implement it. In
+    /// models that do, [`first`](Self::first) and [`observables`](Self::observables) make each parameter by
+    /// [`Real::parameter`], so that it may carry a derivative.
     fn parameters(&self) -> usize {
         0
     }
@@ -186,12 +196,13 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         CoordinateName::element("", index)
     }
 
-    /// The value of a parameter; NaN beyond them.
+    /// The value of a parameter; NaN for an index without parameter.
     fn parameter(&self, _index: usize) -> f64 {
         f64::NAN
     }
 
-    /// The same model with another value of a parameter; none of models that cannot be copied, and beyond the parameters.
+    /// The same model with another value of a parameter; `None` for models that cannot be copied, and for an index
+    /// without parameter.
     #[must_use]
     fn with_parameter(&self, _index: usize, _value: f64) -> Option<Self>
     where
@@ -200,10 +211,11 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         None
     }
 
-    /// What `f` gives, in which the model is evaluated. Models that ask functions given at run time for their inputs catch panics of these; all others do nothing else.
+    /// Calls `f`, in which the model is evaluated, and returns its result. Models that call user functions for their
+    /// inputs catch panics of these; all others only call `f`.
     ///
     /// # Errors
-    /// [`InputPanicked`]; what `f` was working on is to be left alone then.
+    /// [`InputPanicked`]; what `f` was working on must not be used then.
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked>
     where
         Self: Sized,
@@ -211,7 +223,7 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         Ok(f())
     }
 
-    /// The last number of a function given for an input that was not finite, which is forgotten then.
+    /// The last value of an input function that was not finite; the call also clears it.
     fn failed_input(&self) -> Option<InputFailure> {
         None
     }
@@ -224,7 +236,7 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         Self::OBSERVABLES.len()
     }
 
-    /// The name of an observable: `strain[0]`, `strain[1]`, …, or `extension` of a single one.
+    /// The name of an observable: `strain[0]`, `strain[1]`, …, or `extension` for a single one.
     fn column_name(&self, column: usize) -> CoordinateName {
         match Self::OBSERVABLES.get(column) {
             Some(name) => CoordinateName::single(name),
@@ -232,7 +244,7 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         }
     }
 
-    /// The observables, in order of declaration and of sites.
+    /// The observables, in the order of declaration and of sites.
     fn observables<R: Real>(&self, _t: R, _q: &[R], _z: &[R], _values: &mut [R]) {}
 }
 

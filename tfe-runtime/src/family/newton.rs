@@ -1,13 +1,15 @@
-//! Newton's method for families: the element's equations by a sparse factorisation.
+//! Newton's method for models of run-time length whose forces are the unknowns, with a sparse factorisation.
 //!
-//! The unknowns are the forces at all points, what is left of them is r = f(q(f), z(f)) − f, and with K = ∂f/∂q and C = ∂f/∂z at each point
+//! The unknowns are the forces at all points, the residual is r = f(q(f), z(f)) − f, and with K = ∂f/∂q and C = ∂f/∂z
+//! at each point
 //!
 //! ```text
 //! T = 1 − h² A²_lj K_l M⁻¹ − h A_lj C_l M⁻¹ ,     f ← f + T⁻¹ r
 //! ```
 //!
-//! (C without M⁻¹ where z is the momentum). Places are known from the indices of the sums; ordering and symbolic factorisation are done once, the
-//! numeric factorisation only when the old one serves no longer.
+//! (C without M⁻¹ where z is the momentum). The sparsity pattern is known from the indices of the sums. The ordering
+//! and the symbolic factorisation are computed once; the numeric factorisation is repeated only when the old factors no
+//! longer contract well enough.
 
 use super::blocked::{Blocked, Place};
 use super::model::{Block, Gradient, Model};
@@ -19,17 +21,18 @@ use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// A place of second derivatives in the tangent.
+/// The place in the tangent of a second derivative.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     place: Place,
     column: usize,
-    /// The sign with which it enters the force, and whether by velocities.
+    /// The sign with which it enters the force, and whether it is a derivative by velocities.
     sign: f64,
     by_z: bool,
 }
 
-/// The tangent of an element and its factors. Unknowns are ordered by coordinate, the points of one next to each other.
+/// The tangent of an element and its sparse factors. Unknowns are ordered by coordinate, with the points of a
+/// coordinate next to each other.
 #[derive(Clone, Debug)]
 pub(super) struct Tangent {
     pattern: Pattern,
@@ -38,18 +41,18 @@ pub(super) struct Tangent {
     matrix: Blocked,
     diagonal: Vec<Place>,
     derivatives: Vec<f64>,
-    /// The step that the factors belong to.
+    /// The length of the step for which it was factored.
     step: f64,
-    /// Coordinates, velocities (momenta) at all points, a row of n each.
+    /// Coordinates, and velocities (momenta), at all points; a row of n for each.
     pub(super) q: Vec<f64>,
     pub(super) z: Vec<f64>,
-    /// What is left of the equations; what is added to the forces.
+    /// The residual; after the solution, the increment of the forces.
     pub(super) rest: Vec<f64>,
     gradient: [Vec<f64>; 3],
 }
 
 impl Tangent {
-    /// Finds the places and orders them; nothing where memory does not suffice.
+    /// Finds the sparsity pattern and its ordering; `None` where memory does not suffice.
     pub(super) fn new<M: Model>(model: &M, points: usize) -> Option<Self> {
         Self::of(Pattern::of(model), M::FORM, model.len(), points)
     }
@@ -90,7 +93,7 @@ impl Tangent {
         })
     }
 
-    /// Whether there are factors of a step of this length.
+    /// Whether there are factors for a step of this length.
     pub(super) fn serves(&self, h: f64) -> bool {
         self.matrix.is_factored() && self.step == h
     }
@@ -153,12 +156,12 @@ impl Tangent {
         Ok(())
     }
 
-    /// From what is left to what is to be added.
+    /// Replaces the residual by the increment.
     pub(super) fn solve(&mut self) {
         self.matrix.solve(&mut self.rest);
     }
 
-    /// Says that the factors serve no longer.
+    /// Declares the factors out of date.
     pub(super) fn forget(&mut self) {
         self.matrix.forget();
     }

@@ -1,4 +1,4 @@
-//! The velocity of a momentum at one instant, under constraints, by a sparse factorisation (T-74).
+//! The velocity that belongs to a momentum at one instant, under constraints, by a sparse factorisation (T-74).
 
 use super::blocked::{Blocked, Place};
 use super::model::{Gradient, Model};
@@ -9,13 +9,14 @@ use crate::legendre::largest;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The most iterations of Newton's method; one is enough where the energy is quadratic in z.
+/// The largest number of iterations of Newton's method; one suffices where the energy is quadratic in z.
 const MOST: u32 = 50;
 
-/// How often a step is halved.
+/// The number of times a step is halved.
 const MOST_HALVINGS: u32 = 20;
 
-/// How far a regular matrix of masses may be from giving a vector back: with fewer digits constraints say more of velocities than momenta do.
+/// How accurately a regular mass matrix has to reproduce a vector: if it is less accurate, the constraints determine
+/// the velocities better than the momenta do.
 const REGULAR: f64 = 1e-6;
 
 /// Solves, for z = v of a Lagrangian or z = p of a Hamiltonian,
@@ -38,7 +39,7 @@ pub(super) struct Node {
 }
 
 impl Node {
-    /// Finds the places and orders them; nothing where memory does not suffice.
+    /// Finds the sparsity pattern and its ordering; `None` where memory does not suffice.
     pub(super) fn new<M: Model>(model: &M, rows: &Rows) -> Option<Self> {
         Self::of(Pattern::of_mass(model), model.len(), rows)
     }
@@ -68,7 +69,7 @@ impl Node {
     /// Moves `z` from a guess to the solution. The rows have been evaluated at (t, q).
     ///
     /// # Errors
-    /// [`StepError`] where there is none.
+    /// [`StepError`] if there is no solution.
     pub(super) fn solve<M: Model>(
         &mut self,
         model: &M,
@@ -90,7 +91,7 @@ impl Node {
                 *entry = -rate;
             }
             let is_posed = largest(&self.vector).is_finite();
-            // The multiplier is solved for anew each time: it enters linearly.
+            // The multiplier is solved for anew in each iteration: it enters linearly.
             self.matrix.solve(&mut self.vector);
             if is_posed && !rows.phi.is_empty() && !largest(&self.vector).is_finite() {
                 return Err(ConstraintError::DependentRows.into());
@@ -140,7 +141,7 @@ impl Node {
         })
     }
 
-    /// The matrix at one instant, factored.
+    /// Evaluates and factors the matrix at one instant.
     ///
     /// # Errors
     /// [`StepError`] where it is singular.
@@ -154,7 +155,7 @@ impl Node {
         Ok(self.matrix)
     }
 
-    /// The solution of the linear equations at one instant, with Aᵀ at the multipliers.
+    /// Solves the linear equations at one instant, with Aᵀ in the columns of the multipliers.
     ///
     /// # Errors
     /// [`StepError`] where the matrix is singular or a number is not finite.
@@ -176,7 +177,8 @@ impl Node {
         }
     }
 
-    /// Adds the step, or as much of it as brings ∂E/∂z nearer to what is wanted: functions like −m√(1 − v²) end where Newton's step may land.
+    /// Adds the step, or a fraction of it that reduces the residual of ∂E/∂z (damped Newton step): functions like −m√(1
+    /// − v²) are undefined where a full step may lead.
     fn walk<M: Model>(&mut self, model: &M, (t, q): (f64, &[f64]), wanted: &[f64], z: &mut [f64]) {
         let n = z.len();
         let distance = |node: &Self| {
@@ -194,7 +196,7 @@ impl Node {
             }
             self.slope(model, t, q, z);
             let after = distance(self);
-            // Near the solution roundings decide.
+            // Near the solution, rounding errors decide.
             if after <= before || largest(&self.vector[..n]) <= 1e-8 * largest(z) {
                 return;
             }
@@ -205,10 +207,11 @@ impl Node {
         }
     }
 
-    /// Whether the matrix that was factored last is so far from singular that a solution has digits: it gives back a vector that it is multiplied with.
+    /// Whether the matrix that was factored last is far enough from singular for a solution to have digits: it has to
+    /// reproduce a vector that was multiplied by it.
     pub(super) fn is_regular(&self) -> bool {
         let entries = || self.pattern.places().iter().zip(&self.derivatives);
-        // As large as the units of each coordinate have it, and irregular, so that no null vector is missed.
+        // A test vector scaled to the units of each coordinate, and irregular, so that no null vector is missed.
         let mut vector = vec![1.0; self.slope.len()];
         for ((_, row, column), value) in entries() {
             if row == column && value.abs() > 0.0 {

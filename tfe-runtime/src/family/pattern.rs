@@ -1,4 +1,5 @@
-//! Second derivatives of families: places found once, values each time.
+//! Sparsity patterns of second derivatives of models of run-time length: the places are found once, the values are
+//! computed each time.
 
 use super::model::{Block, Entries, Gradient, Model};
 use crate::model::NO_TIME;
@@ -6,9 +7,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::AddAssign;
 
-/// The places of second derivatives that can be other than zero, sorted by block, column and row.
+/// The places of second derivatives that can be non-zero, sorted by block, column and row.
 ///
-/// Found by one run of the kernel: which entries it adds to, and in which order, depends on lengths alone. Another run scatters by that record.
+/// They are recorded in one run of the kernel: the entries to which it adds, and their order, depend on lengths alone.
+/// Later runs scatter their values by this record.
 ///
 /// ```text
 /// (block, row, column)     one for each place, and for each contribution of the kernel the number of its place
@@ -39,7 +41,8 @@ pub struct Values<'a, R = f64> {
 impl<R: AddAssign> Entries<R> for Values<'_, R> {
     #[inline]
     fn add(&mut self, _: Block, _: usize, _: usize, value: R) {
-        // A model whose lengths have changed since brings more or other contributions than were recorded: those are dropped.
+        // If the lengths of the model have changed since the recording, contributions beyond the recorded ones are
+        // dropped.
         if let Some(place) = self.contributions.next()
             && let Some(entry) = self.values.get_mut(*place)
         {
@@ -49,7 +52,7 @@ impl<R: AddAssign> Entries<R> for Values<'_, R> {
 }
 
 impl Pattern {
-    /// Of all second derivatives of a model that has been [checked](Model::check).
+    /// The pattern of all second derivatives of a model that has been [checked](Model::check).
     ///
     /// Memory and time are linear in the number of contributions.
     pub fn of<M: Model>(model: &M) -> Self {
@@ -64,21 +67,21 @@ impl Pattern {
         Self::recorded(|recorder| model.second(NO_TIME, &zero, &zero, first, recorder))
     }
 
-    /// Of ∂²/∂z∂z alone.
+    /// The pattern of ∂²/∂z∂z alone.
     #[cfg(feature = "sparse")]
     pub(super) fn of_mass<M: Model>(model: &M) -> Self {
         let zero = vec![0.0; model.len()];
         Self::recorded(|recorder| model.mass(NO_TIME, &zero, &zero, recorder))
     }
 
-    /// Of the rows of constraints.
+    /// The pattern of the rows of constraints.
     #[cfg(feature = "sparse")]
     pub(super) fn of_rows<M: Model>(model: &M) -> Self {
         let (zero, mut drift) = (vec![0.0; model.len()], vec![0.0; model.constraints()]);
         Self::recorded(|recorder| model.constraint_rows(0.0, &zero, &mut drift, recorder))
     }
 
-    /// Of the second derivatives of constraints.
+    /// The pattern of the second derivatives of constraints.
     #[cfg(feature = "sparse")]
     pub(super) fn of_bends<M: Model>(model: &M) -> Self {
         let (zero, mu) = (vec![0.0; model.len()], vec![0.0; model.constraints()]);
@@ -127,13 +130,13 @@ impl Pattern {
         }
     }
 
-    /// What a kernel adds to, one value a place: `values` is set to zero first.
+    /// Receives the values of a kernel, one for each place; `values` is set to zero first.
     pub fn scatter<'a>(&'a self, values: &'a mut [f64]) -> Values<'a> {
         values.fill(0.0);
         self.add_to(values)
     }
 
-    /// The same in any numbers, added to what is there.
+    /// The same for any kind of numbers, added to the present values.
     pub(super) fn add_to<'a, R>(&'a self, values: &'a mut [R]) -> Values<'a, R> {
         Values {
             contributions: self.contributions.iter(),

@@ -1,4 +1,4 @@
-//! How the momentum at a node changes with what arrives there, under constraints (T-160).
+//! The derivative of the momentum at a node by the arriving momentum, under constraints (T-160).
 
 use super::blocked::Blocked;
 use super::model::{Block, Gradient, Model};
@@ -11,7 +11,7 @@ use crate::error::StepError;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Which entries A and Σ μ φ_qq have.
+/// The sparsity patterns of A and of Σ μ φ_qq.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Places {
     pub(super) rows: Pattern,
@@ -21,7 +21,7 @@ pub(super) struct Places {
 }
 
 impl Places {
-    /// Of a model that has been checked.
+    /// The patterns of a model that has been checked.
     pub(super) fn of<M: Model>(model: &M) -> Self {
         match M::CONSTRAINED {
             true => Self {
@@ -41,7 +41,7 @@ impl Places {
         values
     }
 
-    /// What a parameter changes of φ, A and a.
+    /// The derivatives of φ, A and a by a parameter.
     pub(super) fn by_parameter<M: Model>(
         &self,
         model: &M,
@@ -53,7 +53,8 @@ impl Places {
         self.slopes(model, time, &still)
     }
 
-    /// The slopes of φ, A and a along time, coordinates and what the time carries.
+    /// The derivatives of φ, A and a along the slopes of time and coordinates, and by the parameter that the time
+    /// carries.
     pub(super) fn slopes<M: Model>(&self, model: &M, t: Dual, q: &[Dual]) -> RowSlopes {
         let zeros = |count: usize| vec![Dual::ZERO; count];
         let mut phi = zeros(self.count);
@@ -77,10 +78,10 @@ pub(super) struct RowSlopes {
     pub(super) rows: Vec<f64>,
 }
 
-/// What a parameter changes at fixed unknowns; of a change of the start only what that makes of the impulse.
+/// The direct effect of a parameter at fixed unknowns; for a change of the start only the effect on the impulse.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Explicit {
-    /// h A₀ᵀ m₀, by coordinate.
+    /// h A₀ᵀ m₀, one entry for each coordinate.
     pub(super) impulse: Vec<f64>,
     /// φ at the points, a row for each, and at the end.
     pub(super) phi: Vec<f64>,
@@ -92,7 +93,7 @@ pub(super) struct Explicit {
 }
 
 impl Explicit {
-    /// Of what changes the impulse at the start alone.
+    /// The effect of a change of the impulse at the start alone.
     pub(super) fn impulse(impulse: Vec<f64>) -> Self {
         Self {
             impulse,
@@ -101,12 +102,13 @@ impl Explicit {
     }
 }
 
-/// What a row λ of phase space weighs at a node, times which derivatives by parameters are to be added.
+/// The weights that a row λ of phase space gives to the equations of a node; multiplied by the derivatives of these by
+/// parameters, they are added to the sums.
 #[derive(Clone, Debug)]
 pub(super) struct NodeWeights {
     pub(super) q: Vec<f64>,
     pub(super) v: Vec<f64>,
-    /// φ, a, and A by place.
+    /// φ, a, and A in the order of its pattern.
     pub(super) phi: Vec<f64>,
     pub(super) drift: Vec<f64>,
     pub(super) rows: Vec<f64>,
@@ -114,7 +116,7 @@ pub(super) struct NodeWeights {
     pub(super) momentum: Vec<f64>,
 }
 
-/// How the momentum at a node changes with what arrives there, and with the coordinates.
+/// The derivative of the momentum at a node by the arriving momentum p̃ and by the coordinates.
 ///
 /// ```text
 /// p = p̃ − Aᵀη ,     L_v(q, v, t) + Aᵀη = p̃ ,     A v + a = 0                                          (T-74)
@@ -136,10 +138,10 @@ pub(super) struct Projection {
 }
 
 impl Projection {
-    /// At a node that was solved last, with the rows that are there.
+    /// For the node that was solved last, with its rows.
     ///
     /// # Errors
-    /// [`StepError`] where the matrix is singular.
+    /// [`StepError`] if the matrix is singular.
     pub(super) fn of<M: Model>(
         model: &M,
         (places, second): (&Places, &Pattern),
@@ -162,7 +164,7 @@ impl Projection {
         })
     }
 
-    /// What a parameter changes at the node, from what it changes of the rows and of L_v there.
+    /// The effect of a parameter at the node, from its effects on the rows and on L_v there.
     pub(super) fn explicit(
         &self,
         places: &Places,
@@ -185,7 +187,7 @@ impl Projection {
         }
     }
 
-    /// ∂p/∂a at a fixed p̃, by a parameter.
+    /// ∂p/∂a of a parameter at a fixed p̃.
     pub(super) fn by_parameter<M: Model>(
         &self,
         model: &M,
@@ -206,7 +208,7 @@ impl Projection {
         &self.v
     }
 
-    /// Writes δp for δp̃.
+    /// Replaces δp̃ by δp.
     pub(super) fn apply(
         &self,
         places: &Places,
@@ -227,12 +229,12 @@ impl Projection {
         }
         places.rows.add_product(&self.rates, 1.0, q, &mut side[n..]);
         add_multiple(&mut side, -1.0, p);
-        // With the opposite sign so far, and so is the solution.
+        // So far it has the opposite sign, and so has the solution.
         self.matrix.solve(&mut side);
         places.rows.add_transposed(&self.rows, 1.0, &side[n..], p);
     }
 
-    /// Takes λ back, and gives what it weighs of L_v, A v + a and −Aᵀη.
+    /// The adjoint: takes λ back over the node, and returns the weights of L_v, A v + a and −Aᵀη.
     pub(super) fn pull(&self, places: &Places, of_p: &mut [f64], of_q: &mut [f64]) -> NodeWeights {
         let (n, m) = (of_p.len(), places.count);
         let mut w = vec![0.0; n + m];

@@ -1,4 +1,5 @@
-//! Steps of families whose rates are the unknowns: any kinetic energy, any element, constraints (T-45, T-72, T-73).
+//! The stepper of models of run-time length whose rates are the unknowns: any kinetic energy, any element, constraints
+//! (T-45, T-72, T-73).
 //!
 //! ```text
 //! v_l = Σ_j E_lj ν_j ,     q_l = q₀ + h Σ_j C_lj ν_j
@@ -6,7 +7,8 @@
 //! φ(q₁)/h = 0 ,     Σ_l b_l P_j′(2c_l − 1) φ(q_l)/h = 0
 //! ```
 //!
-//! Newton's method with one sparse matrix for rates and multipliers; its factors are kept while they serve, also from step to step.
+//! It is a simplified Newton iteration with one sparse matrix for rates and multipliers; its factors are kept while
+//! they contract well enough, also from step to step.
 
 use super::blocked::Blocked;
 use super::dense::DenseElement;
@@ -34,7 +36,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Deref;
 
-/// Velocities that move so small a part of the positions in one step are rest.
+/// A velocity that moves less than this fraction of the positions in one step counts as rest.
 const REST: f64 = 1e-5;
 
 /// A stepper of this kind.
@@ -51,9 +53,9 @@ pub(super) struct Rates<M> {
     /// The unknowns: the rates of each coordinate, then the multipliers of each constraint.
     unknowns: Vec<f64>,
     step: Vec<f64>,
-    /// The step that the factors belong to.
+    /// The length of the step for which the matrix was factored.
     factored: f64,
-    /// Whether starts beside the constraints are refused.
+    /// Whether starts that violate the constraints are refused.
     refuses: bool,
     pub(super) points: Vec<Point>,
     rows: Rows,
@@ -61,7 +63,7 @@ pub(super) struct Rates<M> {
     start_rows: Vec<f64>,
     q_end: Vec<f64>,
     v_end: Vec<f64>,
-    /// Length of the last step.
+    /// The length of the last step.
     last: Option<f64>,
     pub(super) start: FamilyState,
     pub(super) end: FamilyState,
@@ -71,7 +73,7 @@ pub(super) struct Rates<M> {
 }
 
 impl<M> Rates<M> {
-    /// The same memory for another holder of the model, with nothing counted yet.
+    /// The same memory with the model held in another way, and all counts zero.
     pub(super) fn hand_over<H>(self, model: H) -> Rates<H> {
         Rates {
             model,
@@ -102,7 +104,7 @@ impl<M> Rates<M> {
 }
 
 impl<M: Model, H: Deref<Target = M>> Rates<H> {
-    /// A stepper at rest; the model has been checked.
+    /// A stepper that has made no step; the model has been checked.
     ///
     /// # Errors
     /// [`ModelError`]
@@ -150,14 +152,15 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         })
     }
 
-    /// Steps may begin beside the constraints and far from their ends, as those of an iteration over many elements do: each ends on the constraints, and whoever iterates
-    /// sees whether they are one motion.
+    /// Allows steps to start from states that violate the constraints, and far from their ends, as in iterations over
+    /// many elements. Each element still ends on the constraints, and the caller checks whether the elements form one
+    /// motion.
     pub(super) fn begin_anywhere(&mut self) {
         self.refuses = false;
         self.control.solve = Solve::Trusting;
     }
 
-    /// The next step continues none.
+    /// Makes the next step start without continuing the last one.
     pub(super) fn forget(&mut self) {
         self.last = None;
     }
@@ -166,7 +169,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         &self.table
     }
 
-    /// Whether the last step ended there.
+    /// Whether the last step ended at this state.
     pub(super) fn ends_in(&self, state: &FamilyState) -> bool {
         self.last.is_some() && self.end == *state
     }
@@ -197,7 +200,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             if last.is_none() {
                 return Err(error);
             }
-            // The continued polynomial may be a worse start than none.
+            // The extrapolated polynomial may be a worse initial guess than a cold start.
             self.rows.evaluate(&*self.model, t, &self.start.q);
             self.begin(t)?;
             self.newton(t, h)?;
@@ -209,7 +212,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         Ok(())
     }
 
-    /// The polynomial of the last step, continued.
+    /// Extrapolates the polynomial of the last step.
     fn continue_rates(&mut self, ratio: f64) {
         let scheme = self.table.view();
         let count = scheme.unknowns();
@@ -225,7 +228,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         }
     }
 
-    /// Constant velocities and no reactions. The rows are those of the start.
+    /// The cold initial guess: constant velocities and no reactions. The rows are those of the start.
     fn begin(&mut self, t: f64) -> Result<(), StepError> {
         let count = self.table.view().unknowns();
         self.matrix.forget();
@@ -241,7 +244,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         Ok(())
     }
 
-    /// Refuses a start that is not on the constraints.
+    /// Refuses a start that violates the constraints.
     fn check_start(&mut self, t: f64, h: f64) -> Result<(), StepError> {
         if self.constraints == 0 || !self.refuses {
             return Ok(());
@@ -268,7 +271,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         if let Some((row, part)) = violated(&*self.model, at, &self.rows, least) {
             return refused(row, true, part);
         }
-        // The velocity that constraints leave has another momentum where the start does not keep them.
+        // If the start violates the constraints, the admissible velocity belongs to another momentum.
         let off = self.start.p.iter().zip(&self.node.slope);
         let off = off.fold(0.0_f64, |off, (p, slope)| off.max((p - slope).abs()));
         let impulse =
@@ -337,7 +340,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
                     return Err(error);
                 }
             }
-            // The first increment alone tells no rate: an old matrix may show a second one.
+            // The first increment alone gives no rate: old factors are allowed a second one.
             let untried = known && iteration == 0;
             fresh = !untried && monitor.rate() > SERVES;
             if monitor.is_stuck() {
@@ -353,19 +356,20 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         })
     }
 
-    /// How large the last increment of the rates is beside the state.
+    /// The size of the last increment of the rates relative to the state.
     fn measure(&self, h: f64) -> Increment {
         let rates = self.start.q.len() * self.table.view().unknowns();
         let (x, step) = (&self.unknowns[..rates], &self.step[..rates]);
         let position = relative(h, &self.start.q, x, step);
-        // The momentum at the end is as good as the velocities, whatever the step; what is left of an increment reaches it through forces only.
+        // The momentum at the end is as accurate as the velocities, whatever the step; the rest of an increment affects
+        // it through the forces only.
         let velocity = 0.25 * relative(1.0, &[], x, step);
-        // Both are NaN, or none is; a multiplier that is no number spoils the rates in the next iteration.
+        // Either both are NaN or neither; a multiplier that is not finite spoils the rates in the next iteration.
         let relative = velocity.max(position);
         Increment { relative, position }
     }
 
-    /// The model at the points, and the constraints at the end.
+    /// Evaluates the model at the points, and the constraints at the end.
     fn evaluate(&mut self, t: f64, h: f64) {
         let scheme = self.table.view();
         let (n, m, count) = (self.start.q.len(), self.constraints, scheme.unknowns());
@@ -378,7 +382,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
                 point.v[a] = product(velocity, rates);
                 point.q[a] = self.start.q[a] + (h * product(position, rates) + self.low.q[a]);
             }
-            // What a model never writes is zero; forces were added to.
+            // Entries that a model never writes stay zero; forces are added to.
             point.force.fill(0.0);
             let first = Gradient {
                 z: &mut point.momentum,
@@ -416,7 +420,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         }
     }
 
-    /// What is left of the equations, in `step`.
+    /// Computes the residual, in `step`.
     fn residual(&mut self, h: f64) {
         self.set_impulse_of_start(h);
         let scheme = self.table.view();
@@ -444,7 +448,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         }
     }
 
-    /// h A₀ᵀ m₀, in `impulse`.
+    /// Computes h A₀ᵀ m₀, in `impulse`.
     fn set_impulse_of_start(&mut self, h: f64) {
         self.impulse.fill(0.0);
         let (n, count) = (self.start.q.len(), self.table.view().unknowns());
@@ -454,9 +458,9 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         }
     }
 
-    /// The end of the element.
+    /// Computes the end of the element.
     fn finish(&mut self, t: f64, h: f64) -> Result<(), StepError> {
-        // The end needs the forces at the final rates, not at the last but one.
+        // The end depends on the forces at the final rates, not at the previous ones.
         self.evaluate(t, h);
         self.set_impulse_of_start(h);
         let scheme = self.table.view();
@@ -492,7 +496,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         &self.unknowns
     }
 
-    /// The matrix of Newton's method at the solution of the last step, from t to t + h, factored.
+    /// The factored tangent at the solution of the last step, from t to t + h.
     pub(super) fn linearised(&mut self, t: f64, h: f64) -> Result<Blocked, StepError> {
         let scheme = self.table.view();
         let element = super::tangent::Element {
@@ -509,7 +513,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         Ok(self.matrix.clone())
     }
 
-    /// The last step, from t to t + h, as it was solved.
+    /// The solution of the last step, from t to t + h.
     pub(super) fn solved<'a>(
         &'a self,
         scheme: &'a SchemeRef<'a>,
@@ -558,7 +562,7 @@ fn product(weights: &[f64], values: &[f64]) -> f64 {
     weights.iter().zip(values).map(|(w, value)| w * value).sum()
 }
 
-/// start + (change + low), and what rounding took.
+/// start + (change + low), and its rounding error.
 fn moved(start: f64, change: f64, low: f64) -> (f64, f64) {
     let sum = DoubleDouble::sum(start, change + low);
     (sum.high, sum.low)

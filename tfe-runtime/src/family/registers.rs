@@ -1,4 +1,4 @@
-//! The unknowns in the widest registers of the processor, and the fixed-point iteration.
+//! The unknowns of models of run-time length in the widest registers of the processor, and their fixed-point iteration.
 
 use super::kernel::Kernel;
 use super::model::FamilyState;
@@ -18,11 +18,11 @@ pub(super) enum Registers {
     Lanes(Space<Lanes<4>>),
 }
 
-/// What has come of the iteration of a step.
+/// The outcome of the iteration of a step.
 pub(super) struct Outcome {
     pub(super) converged: bool,
     pub(super) iterations: u32,
-    /// The last increment, relative, and its ratio to that before.
+    /// The last increment, relative to the state, and its ratio to the one before.
     pub(super) residual: f64,
     pub(super) contraction: f64,
 }
@@ -36,7 +36,8 @@ impl Registers {
         Self::Lanes(Space::new(Lanes([0.0; 4]), kind, n, groups))
     }
 
-    /// Forces to begin with, what low words add, and the place of the first group of points.
+    /// Sets the initial guess of the forces and the contributions of the low words, and places the first group of
+    /// points.
     pub(super) fn prepare(
         &mut self,
         kernel: &dyn Kernel,
@@ -55,7 +56,7 @@ impl Registers {
         self.run(Pass::Begin { is_warm }, problem, leg);
     }
 
-    /// The fixed-point iteration; with `yielding` it gives up as soon as Newton's method is the better way.
+    /// The fixed-point iteration; with `yielding` it gives up as soon as Newton's method is cheaper.
     pub(super) fn iterate(
         &mut self,
         kernel: &dyn Kernel,
@@ -81,7 +82,7 @@ impl Registers {
             let increment = scale.increment(sizes);
             match monitor.judge(increment) {
                 Ok(Verdict::Converged) => {
-                    // Without Newton's method there is nothing else that could be tried.
+                    // Without Newton's method there is no alternative.
                     converged = !yielding || monitor.evidence(true).check(control.solve).is_ok();
                     break;
                 }
@@ -102,7 +103,7 @@ impl Registers {
         }
     }
 
-    /// f(q, z) − f at the points, the points of one coordinate next to each other.
+    /// The residual f(q, z) − f at the points, with the points of a coordinate next to each other.
     #[cfg(feature = "sparse")]
     pub(super) fn rest(
         &mut self,
@@ -137,7 +138,8 @@ impl Registers {
         }
     }
 
-    /// Begins without forces: uniform motion. Those at the start, at all points of a long step, may lead far from where any motion goes.
+    /// Starts from uniform motion, without forces: the forces at the start, applied at all points of a long step, may
+    /// lead far away from the motion.
     #[cfg(feature = "sparse")]
     pub(super) fn release(&mut self) {
         match self {
@@ -147,7 +149,7 @@ impl Registers {
         }
     }
 
-    /// Adds to the forces.
+    /// Adds an increment to the forces.
     #[cfg(feature = "sparse")]
     pub(super) fn correct(&mut self, problem: &Problem, steps: &[f64]) -> Sizes {
         match self {
@@ -157,7 +159,7 @@ impl Registers {
         }
     }
 
-    /// The end of the element; false where that is not finite.
+    /// Computes the end of the element; false where it is not finite.
     pub(super) fn end(
         &mut self,
         problem: &Problem,
@@ -177,7 +179,8 @@ impl Registers {
         }
     }
 
-    /// L_q and Q where the points of the group are placed; with `settles` they are taken for its forces as soon as they are done, and the next group is placed.
+    /// Evaluates L_q and Q at the points of the group that has been placed. With `settles` they become its forces as
+    /// soon as they are computed, and the next group is placed.
     fn evaluate(
         &mut self,
         kernel: &dyn Kernel,

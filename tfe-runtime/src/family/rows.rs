@@ -1,4 +1,4 @@
-//! The constraints of a family at one instant: φ, and the entries of A = ∂φ/∂q that are not zero.
+//! The constraints of a model of run-time length at one instant: φ, and the entries of A = ∂φ/∂q that can be non-zero.
 
 use super::model::Model;
 use super::pattern::Pattern;
@@ -6,11 +6,11 @@ use crate::constrained::rows::has_digits;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Rows that are evaluated anew at every point.
+/// The rows, which are evaluated anew at every point.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
     pattern: Pattern,
-    /// A, one value a place.
+    /// A, one value for each place of its pattern.
     pub(super) values: Vec<f64>,
     /// φ
     pub(super) phi: Vec<f64>,
@@ -19,7 +19,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Where they are; the model has been checked.
+    /// Finds the pattern; the model has been checked.
     pub(super) fn new<M: Model>(model: &M) -> Self {
         let pattern = Pattern::of_rows(model);
         let count = model.constraints();
@@ -86,7 +86,8 @@ impl Rows {
         lengths
     }
 
-    /// Computes sums of squares that have lost their digits anew, divided by the squares of the largest entries of their rows. Returns these entries, and zeros for all other rows.
+    /// Recomputes sums of squares that have lost their digits, divided by the squares of the largest entries of their
+    /// rows. Returns these entries, and zeros for all other rows.
     #[cold]
     fn scale(&self, squares: &mut [f64]) -> Vec<f64> {
         let mut sizes = vec![0.0_f64; squares.len()];

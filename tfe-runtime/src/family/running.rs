@@ -1,4 +1,4 @@
-//! A kernel of a family on its way through the sites.
+//! A kernel of run-time length that runs through its sites, followed closely by the passes of the iteration.
 
 use super::model::{Gradient, Sweep};
 use super::space::{Leg, Pass, Problem, Sizes, Space};
@@ -7,7 +7,7 @@ use crate::registers::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use crate::registers::quad::Quad;
 
-/// Runs passes in code for one instruction set.
+/// Runs passes, compiled for one instruction set.
 pub(super) trait Passes<V>: Copy {
     fn run(self, pass: Pass<'_>, space: &mut Space<V>, problem: &Problem, leg: Leg<'_>) -> Sizes;
 }
@@ -42,7 +42,7 @@ impl Passes<Quad> for pulp::x86::V3 {
     }
 }
 
-/// Where a kernel runs.
+/// What is evaluated in this run.
 #[derive(Clone, Copy)]
 pub(super) struct Place<'a> {
     pub(super) problem: &'a Problem,
@@ -51,12 +51,12 @@ pub(super) struct Place<'a> {
     pub(super) settles: bool,
 }
 
-/// A kernel that runs through the sites of a group, and what follows behind it.
+/// A kernel that runs through the sites of a group, and the pass that follows it.
 pub(super) struct Running<'a, V, P> {
     space: &'a mut Space<V>,
     passes: P,
     place: Place<'a>,
-    /// Coordinates whose forces are settled.
+    /// The number of coordinates whose forces are final.
     settled: usize,
     sizes: Sizes,
 }
@@ -103,7 +103,7 @@ impl<V: Four, P: Passes<V>> Sweep<V> for Running<'_, V, P> {
     }
 }
 
-/// A pass in code for one instruction set.
+/// A pass, compiled for one instruction set.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 struct InRegisters<'a> {
     space: &'a mut Space<Quad>,

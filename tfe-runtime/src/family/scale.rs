@@ -1,11 +1,11 @@
-//! The sizes that the iteration of families is judged by.
+//! The sizes to which increments of the iteration of models of run-time length are compared.
 
 use super::space::{Leg, Problem, Sizes};
 use crate::equations::Increment;
 use crate::legendre::largest;
 use crate::points::sweep::relative;
 
-/// What increments are compared with.
+/// The sizes to which increments are compared.
 #[derive(Clone, Copy)]
 pub(super) struct Scale {
     h: f64,
@@ -27,7 +27,7 @@ impl Scale {
         let velocity = relative(h, self.velocity, size, changed);
         let moved = self.velocity + h.abs() * size;
         let position = relative(h, self.q, moved, 0.5 * h.abs() * changed);
-        // Both are NaN, or none is.
+        // Either both are NaN or neither.
         let relative = velocity.max(position);
         Increment { relative, position }
     }

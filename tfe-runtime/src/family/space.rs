@@ -1,12 +1,14 @@
-//! M q̈ = f(q, q̇, t) for all points of an element, four to a register: the passes of the iteration over as many coordinates as there are.
+//! The passes of the fixed-point iteration for M q̈ = f(q, q̇, t), for all points of an element, four points in a
+//! register, and any number of coordinates.
 //!
 //! ```text
 //! q_l = q₀ + h Σ A_lj v₀ + h² Σ (A²)_lj M⁻¹ f_j ,     unknown f
 //! ```
 //!
-//! The same equations as those of fixed-size models, with another order in memory: for each group of four points all coordinates, so that
-//! loops run through memory once. Long chains do not fit into a cache: a pass that compares forces with those before places the next
-//! group of points too, while they are at hand, and follows a kernel that runs through its sites in strides.
+//! The equations are those of fixed-size models; the order in memory is another one, all coordinates for each group of
+//! four points, so that loops run through memory once. The data of long chains do not fit into a cache. Therefore a
+//! pass that compares forces with those before also places the next group of points while the data are at hand, and it
+//! follows a kernel that runs through its sites in strides.
 
 use super::inertia::Inertia;
 use super::lanes::{at_points, product, rows};
@@ -25,7 +27,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// Everything that does not depend on the kind of register.
+/// Everything that does not depend on the kind of registers.
 #[derive(Clone, Debug)]
 pub(super) struct Problem {
     pub(super) tables: Tables<Heap>,
@@ -34,13 +36,13 @@ pub(super) struct Problem {
     pub(super) velocity_low: Vec<f64>,
 }
 
-/// What the passes have to know about a model.
+/// The properties of a model that the passes need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kind {
     form: Form,
     /// Whether there are forces Q, which may depend on velocities (momenta).
     forced: bool,
-    /// Whether the kernel adds to zeros.
+    /// Whether the kernel adds to its output, which then has to be zero before.
     adds: bool,
 }
 
@@ -54,7 +56,7 @@ impl Kind {
     }
 }
 
-/// The unknowns at all points: for each group of four all coordinates.
+/// The unknowns at all points: for each group of four points, all coordinates.
 #[derive(Clone, Debug)]
 pub(super) struct Space<V> {
     like: V,
@@ -62,16 +64,17 @@ pub(super) struct Space<V> {
     n: usize,
     /// L_q + Q
     forces: Vec<V>,
-    /// How far the points are from the start without forces: h c_l v₀, and what low words of state and tables add.
+    /// The displacement of the points from the start without forces: h c_l v₀, and the contributions of the low words
+    /// of state and tables.
     drift: Vec<V>,
-    /// Coordinates, velocities (momenta) and derivatives of one group.
+    /// Coordinates, velocities (momenta) and derivatives of one group of points.
     q: Vec<V>,
     z: Vec<V>,
     by_q: Vec<V>,
     force: Vec<V>,
 }
 
-/// Where and from where.
+/// The time, length and start of a step.
 #[derive(Clone, Copy)]
 pub(super) struct Leg<'a> {
     pub(super) t: f64,
@@ -80,30 +83,33 @@ pub(super) struct Leg<'a> {
     pub(super) low: &'a FamilyState,
 }
 
-/// One run through all coordinates.
+/// One pass through all coordinates.
 pub(super) enum Pass<'a> {
     /// Places all points at the start.
     Stand,
-    /// Takes the derivatives at hand for the forces at all points.
+    /// Uses the derivatives of the current group as the forces at all points.
     Spread,
-    /// Forces to begin with, those at hand or where the last element's polynomial goes on; what low words add; places the first group.
+    /// Sets the initial guess of the forces, from the current derivatives or by extrapolation of the last element's
+    /// polynomial, and the contributions of low words; places the first group.
     Begin { is_warm: bool },
     /// Places the points of a group.
     #[cfg(feature = "sparse")]
     Place { group: usize },
-    /// Takes the derivatives at hand for the forces of a group at some coordinates, and places them at the points of the next one.
+    /// Uses the current derivatives as the forces of a group for some coordinates, and places these coordinates at the
+    /// points of the next group.
     Settle { group: usize, range: Range<usize> },
-    /// What the derivatives at hand are beyond the forces of a group, the points of one coordinate next to each other.
+    /// The difference between the current derivatives and the forces of a group, with the points of a coordinate next
+    /// to each other.
     #[cfg(feature = "sparse")]
     Rest { group: usize, rest: &'a mut [f64] },
-    /// The end of the element.
+    /// Computes the end of the element.
     End {
         end: &'a mut FamilyState,
         low: &'a mut FamilyState,
     },
 }
 
-/// The largest change of an acceleration and the largest one; NaN where something is not finite.
+/// The largest change of an acceleration and the largest acceleration; NaN if a value is not finite.
 #[derive(Clone, Copy)]
 pub(super) struct Sizes {
     pub(super) changed: f64,
@@ -116,7 +122,7 @@ impl Sizes {
         size: 0.0,
     };
 
-    /// Of both.
+    /// The maximum of both.
     pub(super) fn and(self, other: Self) -> Self {
         let larger = |a: f64, b: f64| a.max(b) + 0.0 * (a + b);
         Self {
@@ -127,7 +133,8 @@ impl Sizes {
 }
 
 impl Pass<'_> {
-    /// Runs, with the number of groups known to the compiler; only [`Pass::Settle`] and [`Pass::End`] have something to say.
+    /// Runs a pass, with the number of groups known to the compiler; only [`Pass::Settle`] and [`Pass::End`] return
+    /// sizes.
     #[inline(always)]
     pub(super) fn run<V: Four>(
         self,
@@ -170,7 +177,7 @@ impl Pass<'_> {
     }
 }
 
-/// How the points of one group follow from forces at all of them.
+/// How the coordinates at the points of one group follow from the forces at all points.
 #[derive(Clone, Copy)]
 struct Placement<V, const G: usize> {
     h: V,
@@ -217,14 +224,14 @@ impl<V: Four> Space<V> {
             forces: zeros(n * groups),
             drift: zeros(n * groups),
             q: zeros(n),
-            // Without forces no kernel reads it.
+            // Without forces Q no kernel reads it.
             z: zeros(n),
             by_q: zeros(n),
             force: zeros(if kind.forced { n } else { 0 }),
         }
     }
 
-    /// What a kernel is lent.
+    /// The slices lent to a kernel.
     #[inline(always)]
     pub(super) fn slices(&mut self) -> (&[V], &[V], Gradient<'_, V>) {
         let first = Gradient {
@@ -240,7 +247,7 @@ impl<V: Four> Space<V> {
         self.n
     }
 
-    /// Coordinates and velocities (momenta) of the group at hand, a row of n for each point.
+    /// Coordinates and velocities (momenta) of the current group, a row of n for each point.
     #[cfg(feature = "sparse")]
     pub(super) fn positions(
         &self,
@@ -258,13 +265,13 @@ impl<V: Four> Space<V> {
         }
     }
 
-    /// No forces.
+    /// Sets all forces to zero.
     #[cfg(feature = "sparse")]
     pub(super) fn release(&mut self) {
         self.forces.fill(self.like.like(0.0));
     }
 
-    /// Adds to the forces.
+    /// Adds an increment to the forces.
     #[cfg(feature = "sparse")]
     pub(super) fn correct(&mut self, problem: &Problem, steps: &[f64]) -> Sizes {
         let points = problem.tables.points;
@@ -275,7 +282,7 @@ impl<V: Four> Space<V> {
                 let force = &mut self.forces[group * self.n + a];
                 let mut lanes = force.lanes();
                 for (lane, value) in lanes.iter_mut().enumerate() {
-                    // Beyond the last point there are copies of it.
+                    // Lanes beyond the last point are copies of it.
                     let step = steps[a * points + (4 * group + lane).min(points - 1)];
                     *value += step;
                     changed = changed.max(inverse * step.abs());
@@ -314,7 +321,7 @@ impl<V: Four> Space<V> {
         }
     }
 
-    /// L_q + Q of the evaluation at hand; leaves zeros for the next one.
+    /// L_q + Q of the current evaluation; leaves zeros for the next one.
     #[inline(always)]
     fn take(&mut self, a: usize) -> V {
         let zero = self.like.like(0.0);
@@ -363,7 +370,7 @@ impl<V: Four> Space<V> {
                 }
             }
             let accelerations = at_points::<V, G>(forces, n, a, like.like(inverse[a]));
-            // What the one rounding of 1/m takes from all accelerations.
+            // The effect of the rounding error of 1/m on all accelerations.
             let missing = at_points::<V, G>(forces, n, a, like.like(inverse_low[a]));
             let (low_q, low_v) = (like.like(low_q[a]), like.like(velocity_low[a]));
             let v = like.like(velocity[a]);
@@ -394,7 +401,8 @@ impl<V: Four> Space<V> {
         let (like, n, kind) = (self.like, self.n, self.kind);
         let zero = like.like(0.0);
         let (mut changed, mut size) = (Largest::none(like), Largest::none(like));
-        // Of several groups, later ones see forces of this iteration at the points of earlier ones: the fixed point is the same.
+        // With several groups, later ones use the forces of this iteration at the points of earlier ones
+        // (Gauss–Seidel); the fixed point is the same.
         let next = (group + 1) % G;
         let placement = Placement::<V, G>::of(like, &problem.tables, leg.h, next);
         let start = &leg.start.q[..n];
@@ -414,7 +422,7 @@ impl<V: Four> Space<V> {
                 force += forced[a];
                 forced[a] = zero;
             }
-            // As accelerations: momenta of light and heavy bodies say nothing beside each other.
+            // Compared as accelerations: momenta of light and heavy bodies are not comparable.
             let factor = like.like(inverse[a]);
             changed.raise(factor * (force - forces[group * n + a]));
             size.raise(factor * force);
@@ -449,7 +457,7 @@ impl<V: Four> Space<V> {
         }
     }
 
-    /// Velocities or momenta at the points of a group.
+    /// Computes velocities or momenta at the points of a group.
     #[inline(always)]
     fn place_rates<const G: usize>(
         &mut self,
@@ -479,8 +487,8 @@ impl<V: Four> Space<V> {
         }
     }
 
-    /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f), to more than the working precision, four coordinates at once; sizes are NaN
-    /// where that is not finite.
+    /// Computes p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) in more than working precision, four
+    /// coordinates at once; the sizes are NaN where the result is not finite.
     #[inline(always)]
     fn end(
         &self,
@@ -495,7 +503,7 @@ impl<V: Four> Space<V> {
         let mut zero = like.like(0.0);
         for at in (0..n).step_by(4) {
             let (force, lever) = self.integrals(&problem.tables, at);
-            // Times 1/m, which has a low word of its own: one rounding of it would be the same in every step.
+            // 1/m is used with its rounding error, which would otherwise be the same in every step.
             let inverse = block(like, &inertia.inverse, at);
             let inverse_low = block(like, &inertia.inverse_low, at);
             let (acceleration, rest) = inverse.product(lever.0);
@@ -509,7 +517,7 @@ impl<V: Four> Space<V> {
             let (q, q_low) = moved::<_, true>(h, velocity, start);
             let start = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
             let (p, p_low) = moved::<_, true>(h, force, start);
-            // Zero times what is not finite is a NaN.
+            // Zero times a number that is not finite is NaN.
             zero += (q + p) * like.like(0.0);
             put(q, &mut end.q, at);
             put(p, &mut end.p, at);
@@ -524,15 +532,16 @@ impl<V: Four> Space<V> {
         }
     }
 
-    /// Σ b f and Σ (bᵀA) f at four coordinates, each a number and what rounding took from it: weights and step are the same numbers in every
-    /// step, and what their products lose is no chance.
+    /// Σ b f and Σ (bᵀA) f for four coordinates, each with its rounding error: weights and step are the same numbers in
+    /// every step, so that the rounding errors of their products are systematic.
     #[inline(always)]
     fn integrals(&self, tables: &Tables<Heap>, at: usize) -> ((V, V), (V, V)) {
         let none = self.like.like(0.0);
         let (mut force, mut lever) = ((none, none), (none, none));
         let last = self.n.min(at + 4);
         for group in 0..tables.groups {
-            // From a register for each coordinate to one for each point; zeros beyond the last coordinate.
+            // Transposes: from one register for each coordinate to one for each point; zeros beyond the last
+            // coordinate.
             let mut by_point = [[0.0; 4]; 4];
             let row = &self.forces[group * self.n..(group + 1) * self.n];
             for (k, value) in row[at..last].iter().enumerate() {
@@ -571,11 +580,11 @@ impl Kind {
 }
 
 impl Problem {
-    /// Velocity at the start, and what low words add.
+    /// Computes the velocity at the start, and the contributions of the low words.
     pub(super) fn begin(&mut self, leg: Leg<'_>) {
         for (a, mass) in self.inertia.mass.iter().enumerate() {
             let p = leg.start.p[a];
-            // The momentum belongs to no rounded velocity; the rest counts as low word.
+            // No floating-point velocity belongs exactly to the momentum; the remainder becomes the low word.
             let v = p / mass;
             let rest = DoubleDouble::product(v, *mass);
             let missing = leg.low.p[a] + DoubleDouble::new(p).minus(rest).high;

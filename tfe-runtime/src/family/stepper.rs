@@ -1,4 +1,4 @@
-//! Steps of families: which unknowns a model gets.
+//! The stepper of models of run-time length, and the choice of its unknowns.
 
 mod kinks;
 
@@ -27,9 +27,11 @@ use core::convert::Infallible;
 
 /// Steps a model of run-time length with one element, on memory of its own.
 ///
-/// Equations M q̈ = f(q, q̇, t) with a constant diagonal M are solved for the forces at all points, in time and memory linear in the number of coordinates: by a
-/// fixed-point iteration, and where that contracts badly (with the feature `sparse`) by Newton's method with a sparse factorisation. With the feature `sparse`
-/// Lagrangians of any other kinetic energy and holonomic constraints are solved for rates and multipliers, by Newton's method alone (T-45, T-72, T-73).
+/// Equations M q̈ = f(q, q̇, t) with a constant diagonal M are solved for the forces at all points, in time and memory
+/// linear in the number of coordinates: by a fixed-point iteration and, where that contracts badly (with the feature
+/// `sparse`), by Newton's method with a sparse factorisation. With the feature `sparse`, Lagrangians with any other
+/// kinetic energy, and with holonomic constraints, are solved for rates and multipliers, by Newton's method only (T-45,
+/// T-72, T-73).
 ///
 /// # Example
 /// The example is at [`Simulation::new`](https://docs.rs/tfe), with which families are run.
@@ -40,17 +42,17 @@ pub struct Stepper<'m, M> {
     length: usize,
     way: Way<Share<'m, M>>,
     legendre: Legendre,
-    /// For reactions, made when it is needed.
+    /// For reactions; made on first use.
     #[cfg(feature = "sparse")]
     instant: Option<Instant>,
     control: Control,
-    /// Steps are cut at kinks, if there are any.
+    /// Whether steps are cut at kinks, if there are any.
     at_kinks: bool,
-    /// Of a last step that was cut.
+    /// The pieces of the last step, if it was cut.
     pieces: Vec<DenseElement>,
 }
 
-/// What is solved for, by a holder of the model.
+/// The unknowns, and the stepper that solves for them.
 #[derive(Clone, Debug)]
 enum Way<M> {
     Forces(Box<Forces<M>>),
@@ -76,12 +78,13 @@ impl<M> Way<M> {
     }
 }
 
-/// All that a [`Stepper`] carries from step to step, without its model: with it the next step is the same to the last bit.
+/// Everything that a [`Stepper`] carries from step to step, without its model: after [`Stepper::resume`] the next step
+/// is the same to the last bit.
 #[derive(Clone, Debug)]
 pub struct Suspended {
     element: Element,
     length: usize,
-    /// Those of the model, and what it has beside them, to the bit.
+    /// The bits of the parameters of the model, and of what its kernels read besides.
     parameters: Vec<u64>,
     way: Way<()>,
 }
@@ -100,7 +103,7 @@ impl Suspended {
         self.element
     }
 
-    /// Whether the stepper had this model: one of the same length and parameters.
+    /// Whether the stepper had this model: one of the same lengths and parameters.
     #[must_use]
     pub fn is_of<M: Model>(&self, model: &M) -> bool {
         self.length == model.len() && self.parameters == parameters(model)
@@ -108,15 +111,15 @@ impl Suspended {
 }
 
 impl<'m, M: Model> Stepper<'m, M> {
-    /// A stepper at rest.
+    /// A stepper that has made no step.
     ///
     /// # Errors
-    /// [`ModelError`]: lengths that do not fit together, an element that does not exist, and what families cannot do.
+    /// [`ModelError`] for inconsistent lengths, an invalid element, and models that are not supported.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ModelError> {
         Self::sharing(model.into(), element, control)
     }
 
-    /// The same of a model that may belong to those that use it.
+    /// The same for a model that may be owned by the steppers that use it.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -151,7 +154,7 @@ impl<'m, M: Model> Stepper<'m, M> {
         }
     }
 
-    /// Leaves the model.
+    /// Drops the model and keeps everything else.
     #[must_use]
     pub fn suspend(self) -> Suspended {
         Suspended {
@@ -162,8 +165,8 @@ impl<'m, M: Model> Stepper<'m, M> {
         }
     }
 
-    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where that had another element, length or way to
-    /// solve, or other parameters or lists of indices.
+    /// A stepper that continues where another one was [suspended](Self::suspend), with all counts zero. If that had
+    /// another element, length, kind of unknowns, parameters or lists of indices, the stepper starts anew.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -220,8 +223,8 @@ impl<'m, M: Model> Stepper<'m, M> {
         Err(ModelError::NotSecondOrder)
     }
 
-    /// Moves `state` from t to t + h. The first iterate continues the last step if `state` is where that ended; a state of one's own is as
-    /// welcome.
+    /// Moves `state` from t to t + h. The initial guess continues the last step if `state` is where that ended; any
+    /// other state may be given as well.
     ///
     /// # Errors
     /// [`StepError`]; `state` is unchanged then. A state of another length than the model's counts as one that is not finite.
@@ -267,7 +270,7 @@ impl<'m, M: Model> Stepper<'m, M> {
                 #[cfg(feature = "sparse")]
                 Way::Rates(rates) => rates.ends_in(state),
             };
-        // Where a step has ended is finite.
+        // The end of a step is known to be finite.
         let is_finite = |values: &[f64]| largest(values).is_finite();
         if !(continues || is_right && is_finite(&state.q) && is_finite(&state.p)) {
             return Err(StepError::NonFinite);
@@ -294,7 +297,8 @@ impl<'m, M: Model> Stepper<'m, M> {
         }
     }
 
-    /// What [`velocity`](super::velocity) says, to the last bit, with the memory and the ordering of equations kept from one call to the next.
+    /// The result of [`velocity`](super::velocity), to the last bit, with the memory and the ordering kept from one
+    /// call to the next.
     ///
     /// # Errors
     /// As [`velocity`](super::velocity).
@@ -302,7 +306,7 @@ impl<'m, M: Model> Stepper<'m, M> {
         self.legendre.velocity(&*self.model, t, state)
     }
 
-    /// What [`reactions`](super::reactions) says, with the ordering of equations kept from one call to the next.
+    /// The result of [`reactions`](super::reactions), with the ordering kept from one call to the next.
     pub fn reactions(&mut self, t: f64, q: &[f64], v: &[f64]) -> Option<Vec<f64>> {
         #[cfg(feature = "sparse")]
         {
@@ -325,18 +329,18 @@ impl<'m, M: Model> Stepper<'m, M> {
         self.element
     }
 
-    /// What iterations are allowed, as asked for.
+    /// The control of the iterations, as requested.
     #[must_use]
     pub fn control(&self) -> Control {
         self.control
     }
 
-    /// Changes what iterations may leave from the next step on: [`Control::tolerance`].
+    /// Changes the tolerance of the iterations from the next step on: [`Control::tolerance`].
     pub fn set_tolerance(&mut self, tolerance: f64) {
         self.way.control_mut().tolerance = tolerance;
     }
 
-    /// Goes on with another model, of which nothing is known yet; what the steps so far have cost stays counted.
+    /// Continues with another model, about which nothing is known yet; the counts are kept.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -349,7 +353,7 @@ impl<'m, M: Model> Stepper<'m, M> {
         Ok(())
     }
 
-    /// What the steps so far have cost.
+    /// The cost of all steps so far.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
         match &self.way {
@@ -359,7 +363,7 @@ impl<'m, M: Model> Stepper<'m, M> {
         }
     }
 
-    /// The same since the last call.
+    /// The counts since the last call.
     pub fn take_statistics(&mut self) -> Statistics {
         core::mem::take(self.statistics_mut())
     }

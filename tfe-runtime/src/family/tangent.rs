@@ -1,4 +1,4 @@
-//! The matrix of Newton's method for [rates](super::rates) and multipliers, by blocks.
+//! The tangent of Newton's method for [rates](super::rates) and multipliers, by blocks.
 //!
 //! ```text
 //! ∂r_i/∂ν_j = Σ_l P_il (L_vv E_lj + h L_vq C_lj) − h G_il (F_v E_lj + h F_q C_lj)
@@ -14,7 +14,7 @@ use crate::scheme::SchemeRef;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// With which weights a second derivative enters.
+/// The role of a second derivative, which determines its weights.
 #[derive(Clone, Copy, Debug)]
 enum Role {
     /// L_vv
@@ -27,7 +27,7 @@ enum Role {
     Stiffness,
 }
 
-/// Where second derivatives go.
+/// The places in the tangent of all second derivatives.
 #[derive(Clone, Debug)]
 pub(super) struct Parts {
     second: Pattern,
@@ -35,7 +35,7 @@ pub(super) struct Parts {
     /// (number of the derivative, role, place)
     parts: Vec<(usize, Role, Place)>,
     bend_places: Vec<Place>,
-    /// Of A and of Aᵀ.
+    /// The places of A and of Aᵀ.
     row_places: Vec<(Place, Place)>,
     values: Vec<f64>,
     bend_values: Vec<f64>,
@@ -53,7 +53,7 @@ pub(super) struct Element<'a> {
 }
 
 impl Parts {
-    /// Finds all places; nothing where memory does not suffice.
+    /// Finds all places; `None` where memory does not suffice.
     pub(super) fn new<M: Model>(model: &M, rows: &Rows, block: usize) -> Option<(Self, Blocked)> {
         Self::of(
             Pattern::of(model),
@@ -78,7 +78,7 @@ impl Parts {
                 let (row, column) = (*row, *column);
                 let (first, mirrored) = match kind {
                     Block::ZZ => (Role::Mass, None),
-                    // d/dt L_v holds L_vq, and L_q its transpose.
+                    // L_vq appears in d/dt L_v, and its transpose in L_q.
                     Block::ZQ => (Role::Turn, Some((number, Role::Damping, column, row))),
                     Block::ForceZ => (Role::Damping, None),
                     _ => (Role::Stiffness, None),
@@ -136,7 +136,7 @@ impl Parts {
         self.add_ends(element, &mut matrix.values);
     }
 
-    /// Second derivatives at one point.
+    /// Adds the second derivatives at one point.
     fn add_motion<M: Model>(
         &mut self,
         model: &M,
@@ -180,7 +180,7 @@ impl Parts {
         }
     }
 
-    /// The constraints at one point.
+    /// Adds the constraints at one point.
     fn add_rows(&self, element: &Element<'_>, l: usize, values: &mut [f64]) {
         let Element { scheme, h, .. } = *element;
         let (points, block) = (scheme.points(), scheme.unknowns());
@@ -198,7 +198,7 @@ impl Parts {
         }
     }
 
-    /// The constraints at both ends.
+    /// Adds the constraints at both ends.
     fn add_ends(&self, element: &Element<'_>, values: &mut [f64]) {
         let block = element.scheme.unknowns();
         let places = self.row_places.iter();

@@ -1,4 +1,4 @@
-//! The derivative of one step of a family by its start, as an operator: implicit differentiation (T-30).
+//! The derivative of one step of a model of run-time length, as an operator: implicit differentiation (T-30).
 
 mod error;
 pub(super) mod pull;
@@ -26,7 +26,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use nalgebra::DMatrix;
 
-/// The derivative of one step of a family, (δp₀, δq₀) ↦ (δp₁, δq₁): an operator on 2n numbers, ordered (p, q).
+/// The derivative of one step of a model of run-time length, (δp₀, δq₀) ↦ (δp₁, δq₁): an operator on 2n numbers,
+/// ordered (p, q).
 ///
 /// At the solution ν of the step, with J the matrix of Newton's method,
 ///
@@ -36,8 +37,9 @@ use nalgebra::DMatrix;
 /// δp₁ = δp₀ + h Σ_l b_l (F_v δv_l + F_q δq_l) ,     δq₁ = δq₀ + h Σ_j β_j δν_j .
 /// ```
 ///
-/// with constraints (T-160). It is the derivative of the numbers that the step computes, whichever iteration computes them. It holds the sparse factors of J and the second
-/// derivatives at the points: memory, and the time of [`apply`](Self::apply), are linear in their entries.
+/// with constraints (T-160). It is the derivative of the result of the step, independent of the iteration that computes
+/// it. It holds the sparse factors of J and the second derivatives at the points: memory, and the time of
+/// [`apply`](Self::apply), are linear in their number of entries.
 ///
 /// # Example
 /// The example is at [`stability::transition`](https://docs.rs/tfe), which makes it.
@@ -47,11 +49,12 @@ pub struct TransitionOperator {
     table: SchemeTable,
     matrix: Blocked,
     pattern: Arc<Pattern>,
-    /// Second derivatives, point by point.
+    /// The second derivatives, point by point.
     values: Vec<f64>,
     end: FamilyState,
     dense: DenseElement,
-    /// What constraints add, and what takes momenta to the polynomial then.
+    /// The contributions of constraints, and the map from momenta to the coefficients of the polynomial, which is then
+    /// needed.
     held: Option<Held>,
     jumps: Arc<[f64]>,
     by_length: Vec<f64>,
@@ -60,18 +63,18 @@ pub struct TransitionOperator {
     inside_by_parameters: Vec<Vec<f64>>,
 }
 
-/// What is the same for all steps of a model with an element.
+/// What all steps of a model with an element have in common.
 #[derive(Clone, Debug)]
 pub(super) struct Ground {
     pub(super) table: SchemeTable,
     pub(super) pattern: Arc<Pattern>,
     pub(super) places: Arc<Places>,
-    /// What takes momenta of an element to its polynomial, with constraints.
+    /// The map from the momenta of an element with constraints to its polynomial.
     jumps: Arc<[f64]>,
 }
 
 impl Ground {
-    /// Of a model that has been checked.
+    /// For a model that has been checked.
     pub(super) fn of<V: Model>(view: &V, table: SchemeTable) -> Self {
         let jumps = match V::CONSTRAINED {
             true => jumps(&table.view()),
@@ -86,7 +89,8 @@ impl Ground {
     }
 }
 
-/// What changes in an element, by point and coordinate: q_l, L_v,l and F_l before rates answer; by coordinate: p₀, and q₁ − h Σ β ν; of constraints.
+/// The direct changes in an element. By point and coordinate: q_l, L_v,l and F_l at fixed rates; by coordinate: p₀, and
+/// q₁ − h Σ β ν; and those of the constraints.
 struct Change<'a, S, L, F, P, A> {
     shift: S,
     lift: L,
@@ -97,10 +101,10 @@ struct Change<'a, S, L, F, P, A> {
 }
 
 impl TransitionOperator {
-    /// That of the step from `state` at time t to t + h.
+    /// The derivative of the step from `state` at time t to t + h.
     ///
     /// # Errors
-    /// [`OperatorError`] where a step of this model is impossible or fails, and for a state of another length.
+    /// [`OperatorError`] if a step of this model is impossible or fails, and for a state of another length.
     pub fn of_step<M: Model>(
         model: &M,
         element: Element,
@@ -114,10 +118,11 @@ impl TransitionOperator {
         Self::next(&view, &mut rates, &Ground::of(&view, table), state, (t, h))
     }
 
-    /// Those of several steps (t, h, state), with an additional force γ v, γ = `damping`, handed over one by one. They may begin beside the constraints, where iterations come to.
+    /// The derivatives of several steps (t, h, state), with an additional force γ v, γ = `damping`; each is passed to a
+    /// function. The steps may start from states that violate the constraints, as iterations over many elements do.
     ///
     /// # Errors
-    /// As [`of_step`](Self::of_step), with the number of the step.
+    /// As [`of_step`](Self::of_step), with the index of the step.
     pub fn of_steps<'s, M: Model>(
         model: &M,
         element: Element,
@@ -132,10 +137,10 @@ impl TransitionOperator {
         Self::of_steps_by(model, element, (damping, &[]), steps, each)
     }
 
-    /// The same with the derivatives by some of the parameters, by their numbers; `each` may end it.
+    /// The same, with the derivatives by the parameters of given indices; `each` may end the iteration over steps.
     ///
     /// # Errors
-    /// As [`of_steps`](Self::of_steps), and what `each` ends it with.
+    /// As [`of_steps`](Self::of_steps), and the error of `each`.
     pub fn of_steps_by<'s, M: Model>(
         model: &M,
         element: Element,
@@ -161,7 +166,7 @@ impl TransitionOperator {
         Ok(())
     }
 
-    /// The tables of an element that this model can step with.
+    /// The tables of an element with which this model can be stepped.
     pub(super) fn admitted<M: Model>(
         model: &M,
         element: Element,
@@ -245,7 +250,7 @@ impl TransitionOperator {
         Ok(transition)
     }
 
-    /// The derivatives by what is no state.
+    /// Computes the derivatives by the length and by the damping.
     fn differentiate<V: Model>(&mut self, rates: &Rates<&V>) {
         let scheme = self.table.view();
         let count = scheme.unknowns();
@@ -275,7 +280,7 @@ impl TransitionOperator {
         (self.by_length, self.by_damping) = (by_length, by_damping);
     }
 
-    /// The derivatives by parameters.
+    /// Computes the derivatives by parameters.
     fn answer<M: Model>(
         &mut self,
         view: &View<'_, M>,
@@ -316,7 +321,7 @@ impl TransitionOperator {
         }
     }
 
-    /// ∂(p₁, q₁)/∂a, one for each parameter that was asked for.
+    /// ∂(p₁, q₁)/∂a, one for each requested parameter.
     #[must_use]
     pub fn by_parameters(&self) -> &[Vec<f64>] {
         &self.by_parameters
@@ -328,7 +333,7 @@ impl TransitionOperator {
         &self.inside_by_parameters
     }
 
-    /// The numbers of the phase space, 2n.
+    /// The dimension of phase space, 2n.
     #[must_use]
     pub fn size(&self) -> usize {
         2 * self.end.q.len()
@@ -340,13 +345,13 @@ impl TransitionOperator {
         &self.end
     }
 
-    /// The polynomial of the step, and nothing of its derivative.
+    /// The polynomial of the step, dropping the derivative.
     #[must_use]
     pub fn into_dense(self) -> DenseElement {
         self.dense
     }
 
-    /// ∂(p₁, q₁)/∂h, of a model in which the time does not appear.
+    /// ∂(p₁, q₁)/∂h, for a model in which the time does not appear.
     #[must_use]
     pub fn by_length(&self) -> &[f64] {
         &self.by_length
@@ -358,7 +363,7 @@ impl TransitionOperator {
         &self.by_damping
     }
 
-    /// Writes (δp₁, δq₁) for (δp₀, δq₀) = `input`.
+    /// Computes (δp₁, δq₁) for (δp₀, δq₀) = `input`.
     ///
     /// # Errors
     /// [`OperatorError::Shape`] unless both have 2n numbers.
@@ -366,7 +371,8 @@ impl TransitionOperator {
         self.apply_inside(input, output, None)
     }
 
-    /// The same, and the changes of the Legendre coefficients of the element's polynomials, in the order of [`inside_by_parameters`](Self::inside_by_parameters).
+    /// The same, with the changes of the Legendre coefficients of the element's polynomials, in the order of
+    /// [`inside_by_parameters`](Self::inside_by_parameters).
     ///
     /// # Errors
     /// As [`apply`](Self::apply).
@@ -387,7 +393,7 @@ impl TransitionOperator {
         Ok(())
     }
 
-    /// The end of the step after a change of its start.
+    /// The change of the end of the step for a change of its start.
     fn respond_to(&self, (p, q): (&[f64], &[f64]), inside: Option<&mut Vec<f64>>) -> Vec<f64> {
         let explicit = self.held.as_ref().map(|held| held.impulse_of(q));
         let change = Change {
@@ -401,7 +407,7 @@ impl TransitionOperator {
         self.respond_inside(&change, inside)
     }
 
-    /// All of it: 2n × 2n, ordered (p, q); 2n applications and 4n² numbers.
+    /// The whole matrix, 2n × 2n, ordered (p, q); takes 2n applications and 4n² numbers.
     #[must_use]
     pub fn matrix(&self) -> DMatrix<f64> {
         let (size, n) = (self.size(), self.end.q.len());
@@ -415,7 +421,7 @@ impl TransitionOperator {
         matrix
     }
 
-    /// The end of the step after a change.
+    /// The change of the end of the step for direct changes in the element.
     fn respond<S, L, F, P, A>(&self, change: &Change<'_, S, L, F, P, A>) -> Vec<f64>
     where
         S: Fn(usize, usize) -> f64,
@@ -427,7 +433,7 @@ impl TransitionOperator {
         self.respond_inside(change, None)
     }
 
-    /// The same with the coefficients of the polynomials, where they are asked for.
+    /// The same, with the coefficients of the polynomials if they are requested.
     fn respond_inside<S, L, F, P, A>(
         &self,
         change: &Change<'_, S, L, F, P, A>,
@@ -560,7 +566,7 @@ impl TransitionOperator {
                     force[column] += value * v[row];
                 }
                 Block::ForceZ => force[row] += value * v[column],
-                // Of L_q and of forces by coordinates.
+                // From L_qq, and from forces by coordinates.
                 _ => force[row] += value * q[column],
             }
         }

@@ -1,4 +1,5 @@
-//! A family as its Lagrangian: what is solved for rates, however it was declared.
+//! A model of run-time length seen as a Lagrangian: its rates are solved for, whether it was declared by a Lagrangian
+//! or by a Hamiltonian.
 
 use super::error::ModelError;
 use super::inertia::Inertia;
@@ -10,7 +11,7 @@ use crate::real::Real;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// A model by its Lagrangian, with an additional force γ v.
+/// A model seen as a Lagrangian, with an additional force γ v.
 ///
 /// A Hamiltonian with a constant diagonal mass matrix has the Lagrangian
 ///
@@ -51,18 +52,19 @@ impl<'m, M: Model> View<'m, M> {
         self.model
     }
 
-    /// The constant masses of a Hamiltonian; of a Lagrangian none.
+    /// The constant masses of a Hamiltonian; `None` for a Lagrangian.
     pub(super) fn masses(&self) -> Option<&[f64]> {
         self.is_hamiltonian().then_some(&self.mass)
     }
 
-    /// What the kernels take beside coordinates, if it is not the velocities.
+    /// The momenta that the kernels of a Hamiltonian take; they are empty for a Lagrangian, whose kernels take
+    /// velocities.
     fn momenta<R: Real>(&self, v: &[R]) -> Vec<R> {
         let masses = self.mass.iter().zip(v);
         masses.map(|(mass, v)| *v * v.like(*mass)).collect()
     }
 
-    /// What a parameter does at a place.
+    /// The effect of a parameter at a place.
     pub(super) fn by_parameter(&self, t: f64, q: &[f64], v: &[f64], parameter: usize) -> Answer {
         let still = |values: &[f64]| -> Vec<Dual> {
             let duals = values.iter().map(|value| Dual::new(*value, 0.0));
@@ -103,7 +105,7 @@ impl<'m, M: Model> View<'m, M> {
                 force,
             };
         }
-        // v = H_p(q, p) stays where the momentum answers: δp = −M ∂H_p/∂a.
+        // v = H_p(q, p) is held fixed, so that the momentum changes: δp = −M ∂H_p/∂a.
         let velocity: Vec<f64> = by_z.collect();
         Answer {
             momentum: self.momenta(&velocity),
@@ -112,7 +114,7 @@ impl<'m, M: Model> View<'m, M> {
         }
     }
 
-    /// From derivatives of H to those of L, and the additional force.
+    /// Converts derivatives of H into those of L, and adds the additional force.
     fn turn<R: Real>(&self, v: &[R], momenta: Vec<R>, first: Gradient<'_, R>) {
         if self.is_hamiltonian() {
             first.z.copy_from_slice(&momenta);
@@ -127,17 +129,17 @@ impl<'m, M: Model> View<'m, M> {
     }
 }
 
-/// What a parameter does at fixed coordinates and velocities.
+/// The effect of a parameter at fixed coordinates and velocities.
 pub(super) struct Answer {
     /// ∂L_v/∂a
     pub(super) momentum: Vec<f64>,
     /// ∂F/∂a at fixed momenta for a Hamiltonian, else at fixed velocities; F = L_q + Q.
     pub(super) force: Vec<f64>,
-    /// The velocity that M makes of the change of momenta of a Hamiltonian, else zero: by what F changes besides.
+    /// For a Hamiltonian, the velocity M⁻¹δp of the change of momenta, through which F changes as well; otherwise zero.
     pub(super) velocity: Vec<f64>,
 }
 
-/// The parts of a gradient, for a while.
+/// A temporary borrow of the parts of a gradient.
 fn lend<'a, R>(first: &'a mut Gradient<'_, R>) -> Gradient<'a, R> {
     Gradient {
         z: &mut *first.z,
@@ -146,7 +148,7 @@ fn lend<'a, R>(first: &'a mut Gradient<'_, R>) -> Gradient<'a, R> {
     }
 }
 
-/// Turns second derivatives of H into those of L.
+/// Converts second derivatives of H into those of L.
 struct Turned<'a, E> {
     mass: &'a [f64],
     entries: &'a mut E,
@@ -155,7 +157,7 @@ struct Turned<'a, E> {
 impl<R: Real, E: Entries<R>> Entries<R> for Turned<'_, E> {
     fn add(&mut self, block: Block, row: usize, column: usize, value: R) {
         match block {
-            // M is constant and told by the view; there is nothing mixed.
+            // M is constant and known to the view; mixed derivatives vanish.
             Block::ZZ | Block::ZQ => {}
             Block::QQ => self.entries.add(block, row, column, -value),
             Block::ForceZ => {

@@ -1,23 +1,25 @@
-//! The first root of switching functions along a step.
+//! The search for the first root of the switching functions along a step.
 
 use crate::root::root;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// A switching function changes its sign.
+/// A sign change of a switching function.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Crossing {
-    /// Which one.
+    /// The index of the function.
     pub(super) switch: usize,
-    /// Where in the step.
+    /// The place in the step.
     pub(super) tau: f64,
 }
 
-/// Values that are smaller, relative to the largest one of the step, are roundings.
+/// Values below this fraction of the largest one in the step are rounding errors.
 const ROUNDING: f64 = 1e-13;
 
-/// Finds the first change of sign of any of the functions that `values` gives at τ; the signs are looked at in `samples` equal parts of the range, and where a function
-/// comes close to zero between two of them. Roots are known to `resolution`; one that is as near to the start as that has been passed before. Places without values are passed over.
+/// Finds the first sign change of any of the functions that `values` gives at τ. The signs are compared at the ends of
+/// `samples` equal parts of the range, and where a function comes close to zero between two of them. Roots are found to
+/// within `resolution`; a root within that distance of the start has already been passed. Places without values are
+/// skipped.
 pub(super) fn first_crossing(
     range: Range<f64>,
     samples: usize,
@@ -38,11 +40,11 @@ pub(super) fn first_crossing(
         rows.push(row);
         times.push(tau);
     }
-    // What a function may do within the resolution of the start, relative to what it does in the first part.
+    // How much a function may change within the resolution of the start, relative to its change in the first part.
     let passed = (16.0 * resolution / part).max(ROUNDING);
     let count = rows.iter().map(Vec::len).max()?;
     let mut first: Option<Crossing> = None;
-    // All functions at the first root, once they are asked for.
+    // All functions at the first root, computed on first use.
     let mut there = Vec::new();
     for switch in 0..count {
         let column: Vec<f64> = rows.iter().map(|row| value_in(row, switch)).collect();
@@ -82,12 +84,12 @@ fn value(values: &mut dyn FnMut(f64, &mut Vec<f64>), switch: usize, tau: f64) ->
     value_in(&row, switch)
 }
 
-/// One of the values at a place; NaN, which has no sign, where there are none.
+/// One of the values at a place; NaN, which has no sign, if there are none.
 fn value_in(row: &[f64], switch: usize) -> f64 {
     row.get(switch).copied().unwrap_or(f64::NAN)
 }
 
-/// Whether any of the functions is zero at the start, to what it does within the resolution, and not soon after.
+/// Whether any of the functions is zero at the start, up to its change within the resolution, and non-zero soon after.
 pub(super) fn begins_on_root(resolution: f64, values: &mut dyn FnMut(f64, &mut Vec<f64>)) -> bool {
     const SOON: f64 = 1e-3;
     let (mut start, mut soon) = (Vec::new(), Vec::new());
@@ -99,7 +101,7 @@ pub(super) fn begins_on_root(resolution: f64, values: &mut dyn FnMut(f64, &mut V
     })
 }
 
-/// The side on which the function begins, and the first part of the step in which it goes to the other one.
+/// The sign with which the function begins, and the first part of the step in which it changes.
 fn bracket(
     times: &[f64],
     column: &[f64],
@@ -117,7 +119,7 @@ fn bracket(
         if here < 0.0 {
             return Some((side, times[k - 1]..times[k]));
         }
-        // Down and up again between the samples.
+        // The function goes down and up again between the samples.
         if k + 1 == column.len() {
             break;
         }

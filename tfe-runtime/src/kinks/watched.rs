@@ -1,4 +1,5 @@
-//! Numbers that write down what is compared: a kernel evaluated with them tells its switching functions, and which of them have a part in its results.
+//! Numbers that record comparisons: a kernel evaluated with them gives its switching functions, and which of them
+//! influence its results.
 
 use crate::real::Real;
 use alloc::vec;
@@ -6,15 +7,16 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Where switching functions are written, in the order in which a kernel comes to them, and which of them have decided what.
+/// Collects the switching functions in the order in which a kernel evaluates them, and which of them have decided which
+/// results.
 #[derive(Debug)]
 pub(crate) struct Log(RefCell<Notes>);
 
 #[derive(Debug)]
 struct Notes {
-    /// Of the switching functions.
+    /// The values of the switching functions.
     values: Vec<f64>,
-    /// What has decided numbers, beyond the first switching functions.
+    /// The records of decisions that do not fit into the bits of [`Origin`].
     deciders: Vec<Decider>,
 }
 
@@ -25,20 +27,20 @@ enum Decider {
     Both(usize, usize),
 }
 
-/// So many switching functions are a bit each.
+/// The number of switching functions with a bit of their own.
 const EARLY: usize = 64;
 
-/// Which switching functions have decided a number.
+/// The switching functions by which a number has been decided.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Origin {
-    /// Of the first ones, a bit each.
+    /// One bit for each of the first functions.
     early: u64,
-    /// A place among the deciders, for the others.
+    /// For the others, a place in the list of decisions.
     late: Option<usize>,
 }
 
 impl Log {
-    /// An empty one, in memory that may be used.
+    /// An empty log, in memory that may be reused.
     pub(crate) fn new(mut values: Vec<f64>) -> Self {
         values.clear();
         Self(RefCell::new(Notes {
@@ -47,12 +49,13 @@ impl Log {
         }))
     }
 
-    /// What has decided any of some numbers.
+    /// The union of the origins of several numbers.
     pub(crate) fn deciding<'a>(&self, numbers: impl Iterator<Item = &'a Watched<'a>>) -> Origin {
         numbers.fold(Origin::default(), |all, one| self.both(all, one.origin))
     }
 
-    /// The values of all switching functions. Those that are not of an origin, and decide nothing of the results, are zero, which has no sign: the |x| in max(|x| − a, 0) near x = 0.
+    /// The values of all switching functions. Those that are not in the origin, and so decide nothing in the results,
+    /// are replaced by zero, which has no sign: for example the |x| in max(|x| − a, 0) near x = 0.
     pub(crate) fn decisive(self, Origin { early, late }: Origin) -> Vec<f64> {
         let Notes {
             mut values,
@@ -117,12 +120,12 @@ impl Log {
     }
 }
 
-/// A number; those that depend on the time or the state know where to write.
+/// A number; those that depend on the time or the state refer to the log.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Watched<'a> {
     value: f64,
     log: Option<&'a Log>,
-    /// What has decided the branch in which this is.
+    /// The decisions that led to the branch in which it was computed.
     origin: Origin,
     /// Whether it is constant in that branch.
     is_fixed: bool,
@@ -155,7 +158,7 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// The same, which the sign of `value` has decided, too.
+    /// The same number, with the sign of `value` as a further decision.
     #[inline]
     fn decided_by(self, value: f64) -> Self {
         let Some(log) = self.log else { return self };
@@ -165,7 +168,7 @@ impl<'a> Watched<'a> {
         }
     }
 
-    /// One of two, which the sign of their difference has decided.
+    /// One of two numbers, chosen by the sign of their difference.
     #[inline]
     fn chosen(is_first: bool, first: Self, second: Self) -> Self {
         let chosen = if is_first { first } else { second };
@@ -176,14 +179,14 @@ impl<'a> Watched<'a> {
         .decided_by(first.value - second.value)
     }
 
-    /// Whether what it is a factor of vanishes.
+    /// Whether a product with it vanishes.
     #[inline]
     fn vanishes(self) -> bool {
         self.is_fixed && self.value == 0.0
     }
 }
 
-/// What a comparison gives.
+/// The result of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Choice<'a> {
     holds: bool,

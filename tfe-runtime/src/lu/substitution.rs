@@ -1,14 +1,16 @@
-//! Substitution of one right side in larger systems: four sums of a row side by side, so that none waits for the one before it.
+//! Forward and backward substitution in larger systems: each row is summed in four independent partial sums, so that no
+//! addition waits for the one before it.
 
-/// Sums side by side.
+/// The number of partial sums.
 pub(super) const FOUR: usize = 4;
 
-/// Systems of fewer rows are solved before several sums side by side pay.
+/// Below this number of rows, several partial sums are not worth their cost.
 pub(super) const LARGE: usize = 16;
 
-/// Solves L U x = b in place, row by row; b with its rows exchanged.
+/// Solves L U x = b in place, row by row; the rows of b have already been exchanged.
 ///
-/// Rows of large systems belong to blocks of four. What lies beyond the own block enters by four sums, of every fourth factor each.
+/// The rows of large systems form blocks of four. Factors outside the own block are summed in four partial sums, each
+/// with every fourth factor.
 pub(super) fn solve(size: usize, factors: &[f64], vector: &mut [f64]) {
     let whole = if size < LARGE { 0 } else { size / FOUR * FOUR };
     for row in 0..size {
@@ -55,7 +57,7 @@ pub(super) fn total([a, b, c, d]: [f64; FOUR]) -> f64 {
     (a + b) + (c + d)
 }
 
-/// Solves Uᵀ Lᵀ x = b in place, with one row of factors after the other.
+/// Solves Uᵀ Lᵀ x = b in place, one row of factors after the other.
 #[inline(always)]
 pub(super) fn solve_transposed(size: usize, factors: &[f64], vector: &mut [f64]) {
     for (j, row) in factors.chunks_exact(size).enumerate() {
@@ -75,7 +77,8 @@ pub(super) fn solve_transposed(size: usize, factors: &[f64], vector: &mut [f64])
     }
 }
 
-/// Solves L U X = B in place, many right sides at once, row by row; B with its rows exchanged.
+/// Solves L U X = B in place, with many right-hand sides at once, row by row; the rows of B have already been
+/// exchanged.
 #[inline(always)]
 pub(super) fn solve_columns(size: usize, factors: &[f64], columns: usize, sides: &mut [f64]) {
     for k in 0..size {
@@ -95,7 +98,7 @@ pub(super) fn solve_columns(size: usize, factors: &[f64], columns: usize, sides:
     }
 }
 
-/// row −= Σ factor · other, one after the other.
+/// row −= Σ factor · other, one term after the other.
 #[inline(always)]
 fn subtract_all(row: &mut [f64], factors: &[f64], others: &[f64]) {
     let columns = row.len();

@@ -1,10 +1,11 @@
-//! Elimination in wide registers: four pivots at a time, each entry with the roundings of one after the other.
+//! Gaussian elimination in wide registers: four pivots at a time, each entry with the same roundings as for one pivot
+//! after the other.
 
 use super::substitution::{self, FOUR, subtract, subtract_four};
 use pulp::x86::V3;
 use pulp::{NullaryFnOnce, f64x4};
 
-/// Solves L U x = b in place; b with its rows exchanged.
+/// Solves L U x = b in place; the rows of b have already been exchanged.
 pub(super) fn solve(isa: V3, size: usize, factors: &[f64], vector: &mut [f64]) {
     isa.vectorize(Solve {
         isa,
@@ -69,7 +70,7 @@ impl NullaryFnOnce for Solve<'_> {
     }
 }
 
-/// Subtracts what four rows, from one column on, make of a vector.
+/// Subtracts the products of four rows, from one column on, with a vector.
 #[inline(always)]
 fn subtract_products(
     isa: V3,
@@ -129,7 +130,7 @@ impl NullaryFnOnce for Transposed<'_> {
     }
 }
 
-/// Factors a matrix in place; the column at which elimination stopped, if it did.
+/// Factors a matrix in place; returns the column at which elimination stopped, if it did.
 pub(super) fn factor(
     isa: V3,
     size: usize,
@@ -143,7 +144,7 @@ pub(super) fn factor(
     })
 }
 
-/// Both substitutions with many right sides, row by row, whose rows are exchanged.
+/// Forward and backward substitution with many right-hand sides, row by row; their rows have already been exchanged.
 pub(super) fn substitute(isa: V3, size: usize, factors: &[f64], columns: usize, sides: &mut [f64]) {
     isa.vectorize(Substitute {
         size,
@@ -176,7 +177,7 @@ impl NullaryFnOnce for Factor<'_> {
                 pivots[column] = pivot(size, matrix, column)?;
                 eliminate(size, matrix, column, end);
             }
-            // The rows of the panel among themselves, then all rows below.
+            // First the rows of the panel, then all rows below it.
             let (panel, below) = matrix.split_at_mut(end * size);
             for row in first + 1..end {
                 let (above, own) = panel.split_at_mut(row * size);
@@ -238,7 +239,8 @@ fn pivot(size: usize, matrix: &mut [f64], column: usize) -> Result<usize, usize>
     Ok(pivot)
 }
 
-/// The factors of a column, and what it takes of the columns of its panel, which ends before `end`.
+/// Computes the factors of a column, and subtracts its contributions from the columns of its panel, which ends before
+/// `end`.
 #[inline(always)]
 fn eliminate(size: usize, matrix: &mut [f64], column: usize, end: usize) {
     let (upper, lower) = matrix.split_at_mut((column + 1) * size);

@@ -1,20 +1,20 @@
-//! What lies side by side in registers while an iteration computes.
+//! The arrangement of numbers in registers during an iteration: points of one trajectory, or several trajectories.
 
 use super::inertia::Inertia;
 use crate::model::{First, Model};
 use crate::registers::side::Side;
 use crate::registers::storage::{Fixed, Matrix, Storage};
 
-/// A number for every coordinate of what lies side by side.
+/// A number for every coordinate of everything that is side by side.
 pub(crate) type Row<const L: usize, const N: usize> = [[f64; L]; N];
 
-/// What lies side by side in registers: points of a trajectory, or trajectories.
+/// The arrangement of numbers in registers: the lanes are points of one trajectory, or trajectories.
 pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
     type Memory: Storage;
     type Size: Size<V>;
     /// A number at the start of a step: one for all points, or one for each trajectory.
     type Number: Copy;
-    /// A number of the points of a row.
+    /// An entry of a vector over the points, for one row.
     type Entry: Copy;
 
     fn tables(&self) -> &Fixed<Self::Memory>;
@@ -23,10 +23,10 @@ pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
     /// The length of the step.
     fn h(&self) -> f64;
 
-    /// Such a number in registers.
+    /// A number at the start, in registers.
     fn number(&self, like: V, number: Self::Number) -> V;
 
-    /// What a vector over the points has for each row.
+    /// The entries of a vector over the points, one for each row.
     fn entries(vector: &[[f64; 4]]) -> &[Self::Entry];
 
     /// An entry in registers.
@@ -38,10 +38,10 @@ pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
     /// Coordinate and momentum `a` at the start.
     fn start(&self, like: V, a: usize) -> (V, V);
 
-    /// What rounding took from them.
+    /// The rounding errors of both.
     fn low(&self, like: V, a: usize) -> (V, V);
 
-    /// The product of a table with a vector over the points, for every coordinate that is wanted.
+    /// The product of a table with a vector over the points, for every coordinate that is requested.
     fn apply(
         &self,
         like: V,
@@ -51,10 +51,10 @@ pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
         products: &mut [Row<L, N>],
     );
 
-    /// Writes an unknown, where it is wanted.
+    /// Writes an unknown in those lanes that are to be written.
     fn set(&self, place: &mut [f64; L], value: V);
 
-    /// The kernel of first derivatives at q and z, and the one of ∂²/∂z∂z if that is asked for.
+    /// Calls the kernel of first derivatives at q and z, and that of ∂²/∂z∂z if it is requested.
     fn first<M: Model<N>>(
         model: &M,
         t: V,
@@ -70,6 +70,6 @@ pub(crate) trait Size<V>: Copy {
 
     fn raise(&mut self, value: V);
 
-    /// The same for a value of which others tell whether it is finite.
+    /// The same for a value whose finiteness is checked elsewhere.
     fn raise_finite(&mut self, value: V);
 }

@@ -1,4 +1,4 @@
-//! Tables that are computed when the program runs.
+//! Tables of the iterations of `points` that are computed at run time.
 
 use super::tables::{ProjectionTarget, Tables, Target};
 use crate::registers::storage::{Fixed, Heap, Matrix, Projection, Weights};
@@ -12,14 +12,15 @@ static KNOWN: std::sync::Mutex<std::vec::Vec<(crate::Element, Arc<Fixed<Heap>>)>
     std::sync::Mutex::new(std::vec::Vec::new());
 
 impl Tables<Heap> {
-    /// Of an element of no more than 16 points; clones share what no step changes. With the feature `std` they are computed once in a program.
+    /// The tables of an element with at most 16 points; clones share the tables that no step changes. With the feature
+    /// `std` they are computed once in a program.
     pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
         Self::new(Self::shared(scheme))
     }
 
     #[cfg(feature = "std")]
     fn shared(scheme: &SchemeRef<'_>) -> Arc<Fixed<Heap>> {
-        // A panic elsewhere leaves the list as good as it was.
+        // The list is valid even if another thread has panicked.
         let mut known = KNOWN
             .lock()
             .unwrap_or_else(std::sync::PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! The end of an element, to more than the working precision where that is asked for.
+//! The end of an element, in more than working precision where that is requested.
 
 use super::{Leg, Work};
 use crate::model::State;
@@ -46,7 +46,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
     ) {
         let (tables, h) = (leg.tables, like.like(leg.h));
         if const { matches!(N, 1 | 2) } {
-            // Σ (bᵀA) f beside Σ b f; what comes of the latter on the way to velocities is left behind.
+            // Σ (bᵀA) f beside Σ b f; the contributions of the latter to the velocities are not needed here.
             let force = (&tables.weights, &*self.forces);
             let sums = (tables.lever).sums_beside::<_, N, EXACT>(like, &self.forces, force);
             let mut lever = sums;
@@ -97,7 +97,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
         }
     }
 
-    /// Four of them from coordinate `at` on: what a mass matrix with more than a diagonal has made of forces already, else forces over masses.
+    /// Four accelerations from coordinate `at` on: forces already multiplied by an inverse mass matrix that is not
+    /// diagonal, otherwise forces divided by masses.
     #[inline(always)]
     fn accelerations<V: Four, const EXACT: bool>(
         &self,
@@ -114,7 +115,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         if const { !EXACT } {
             return (inverse * forces.0, forces.1);
         }
-        // Times 1/m, which has a low word of its own: one rounding of it would be the same in every step.
+        // 1/m is used with its rounding error, which would otherwise be the same in every step.
         let (product, rest) = inverse.product(forces.0);
         let rest = block(like, &inertia.inverse_low, at).times_plus(forces.0, rest);
         (product, inverse.times_plus(forces.1, rest))
@@ -122,7 +123,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
 }
 
 impl<const N: usize, S: Storage> Leg<'_, N, S> {
-    /// The start, and what it is more than its rounded numbers: coordinates beside momenta.
+    /// The start and its rounding error, with coordinates beside momenta.
     #[inline(always)]
     fn both<V: Four>(&self, like: V) -> (V, V) {
         (
@@ -132,7 +133,8 @@ impl<const N: usize, S: Storage> Leg<'_, N, S> {
     }
 }
 
-/// Numbers of one or two coordinates beside those of their momenta, as in [`sums_beside`](crate::registers::storage::Weights::sums_beside).
+/// The values of one or two coordinates beside those of their momenta, as in
+/// [`sums_beside`](crate::registers::storage::Weights::sums_beside).
 #[inline(always)]
 fn beside<V: Four, const N: usize>(like: V, q: &[f64; N], p: &[f64; N]) -> V {
     let mut lanes = [0.0; 4];
@@ -155,7 +157,7 @@ fn first_of<V: Four, const N: usize>(one: V, other: V) -> V {
     one.with(lanes)
 }
 
-/// States from numbers that lie beside each other.
+/// States from values that are side by side.
 #[inline(always)]
 fn apart<V: Four, const N: usize>((high, low): (V, V)) -> (State<N>, State<N>) {
     let (mut end, mut end_low) = (State::ZERO, State::ZERO);
@@ -167,7 +169,7 @@ fn apart<V: Four, const N: usize>((high, low): (V, V)) -> (State<N>, State<N>) {
     (end, end_low)
 }
 
-/// start + h · rate, to twice the precision or to the working one.
+/// start + h · rate, in twice or in single working precision.
 #[inline(always)]
 pub(crate) fn moved<V: Precise, const EXACT: bool>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
     if const { EXACT } {
@@ -177,7 +179,7 @@ pub(crate) fn moved<V: Precise, const EXACT: bool>(h: V, rate: (V, V), start: (V
     }
 }
 
-/// start + h · rate, each a number and what rounding took from it.
+/// start + h · rate, where each is a number with its rounding error.
 #[inline(always)]
 fn moved_exactly<V: Precise>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
     let (product, rest) = h.product(rate.0);

@@ -1,4 +1,4 @@
-//! Where kernels are evaluated, in a step or kept from step to step.
+//! Arguments and results of kernels, made anew in each step or kept from step to step.
 
 use crate::lanes::Lanes;
 use crate::model::First;
@@ -7,8 +7,8 @@ use crate::registers::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use crate::registers::quad::Quad;
 
-/// Where a kernel is evaluated, and what it writes there. Entries that are always zero are never written, so one serves for all points of a step: with many coordinates it takes as
-/// long to fill them with zeros as to evaluate a kernel.
+/// The arguments and results of a kernel. Entries that are always zero are never written, so that one object serves all
+/// points of a step: with many coordinates, filling it with zeros takes as long as evaluating a kernel.
 #[derive(Clone, Debug)]
 pub(crate) struct Evaluation<V, const N: usize> {
     pub(crate) q: [V; N],
@@ -32,10 +32,10 @@ impl<V: Real, const N: usize> Evaluation<V, N> {
     }
 }
 
-/// Coordinates up to which a place is made anew in each step: in registers, as far as these go.
+/// Up to this number of coordinates, it is made anew in each step, in registers as far as possible.
 pub(super) const FEW: usize = 8;
 
-/// Where kernels are evaluated at four points, in the numbers of the processor.
+/// The arguments and results of kernels at four points, in the numbers of the processor.
 #[derive(Clone, Debug)]
 pub(super) enum Places<const N: usize> {
     None,
@@ -44,13 +44,13 @@ pub(super) enum Places<const N: usize> {
     Quads(Evaluation<Quad, N>),
 }
 
-/// Numbers of such a place.
+/// The scalar types for which they can be kept.
 pub(super) trait Placed: Four {
-    /// The place for these numbers; all zero where there was none.
+    /// The object for these numbers; all zero if there was none.
     fn place<const N: usize>(self, kept: &mut Places<N>) -> &mut Evaluation<Self, N>;
 }
 
-/// The place in a variant.
+/// Implements it for one variant.
 macro_rules! placed {
     ($numbers:ty, $variant:ident) => {
         impl Placed for $numbers {

@@ -1,4 +1,5 @@
-//! Equations of first order, velocities or the rates of phase space as unknowns: one text for four points of a trajectory side by side and for eight trajectories.
+//! The iteration for equations of first order, whose unknowns are velocities or the rates of phase space: one text for
+//! four points of a trajectory side by side and for eight trajectories.
 
 use super::arrangement::{Arrangement, Row, Size};
 use super::evaluation::Evaluation;
@@ -6,27 +7,27 @@ use super::forms::acting;
 use crate::model::Model;
 use crate::registers::side::{Side, factor, solve, store};
 
-/// The unknowns and what their iteration needs, a row for each point or each group of points.
+/// The unknowns and the working memory of their iteration, a row for each point or each group of points.
 pub(crate) struct Rows<'a, const L: usize, const N: usize> {
     /// ν, or κ: rates of the coordinates.
     pub(crate) rates: &'a mut [Row<L, N>],
     /// L_q + Q, or π: rates of the momenta.
     pub(crate) forces: &'a mut [Row<L, N>],
     pub(crate) momenta: &'a mut [Row<L, N>],
-    /// Of phase space.
+    /// The velocities in phase space.
     pub(crate) velocities: &'a mut [Row<L, N>],
-    /// Products with the tables.
+    /// Products of the tables with the unknowns.
     pub(crate) products: &'a mut [Row<L, N>],
     pub(crate) more_products: &'a mut [Row<L, N>],
-    /// What low words of the start and of the tables add.
+    /// The contributions of the low words of the start and of the tables.
     pub(crate) low_position: &'a mut [Row<L, N>],
     pub(crate) low_momentum: &'a mut [Row<L, N>],
-    /// Factors of L_vv, or H_pp, where they are not constant.
+    /// The LU factors of L_vv, or H_pp, where they are not constant.
     pub(crate) masses: &'a mut [[Row<L, N>; N]],
 }
 
 impl<const L: usize, const N: usize> Rows<'_, L, N> {
-    /// What low words of the start and of the tables add at the points.
+    /// Computes the contributions of the low words of the start and of the tables at the points.
     #[inline(always)]
     pub(crate) fn set_low<V, A, M>(self, like: V, at: &A)
     where
@@ -65,7 +66,8 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
         }
     }
 
-    /// A Lagrangian: momenta and forces at the velocities, then velocities that belong to the momenta asked for. How much these have changed, and how large they are.
+    /// One iteration for a Lagrangian: momenta and forces at the velocities, then velocities that belong to the
+    /// required momenta. Returns how much these have changed, and how large they are.
     #[inline(always)]
     pub(crate) fn sweep_velocity<V, A, M>(
         self,
@@ -127,7 +129,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
         }
         at.apply(like, &tables.once, acting, forces, products);
         let (mut changed, mut size) = (A::Size::none(like), A::Size::none(like));
-        // The loops apart: the one without projection is what most elements go through.
+        // Two separate loops: most elements need the one without projection.
         if let Some(projection) = projection {
             for c in 0..count {
                 let lacking = (&products[c], &low_momentum[c], &momenta[c]);
@@ -136,7 +138,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                     more_products[c][a] = step[a].lanes();
                 }
             }
-            // With one mass matrix for all points these would lie among the rates already.
+            // With one mass matrix for all points, these would already be rates of the admissible degree.
             let (onto_rates, all) = (&projection.onto_rates, &[true; N]);
             at.apply(like, onto_rates, all, more_products, products);
             for c in 0..count {
@@ -145,7 +147,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                     let rate = like.with(rates[c][a]) + step;
                     at.set(&mut rates[c][a], rate);
                     changed.raise(step);
-                    // What is not finite shows in the change.
+                    // A value that is not finite shows up in the change.
                     size.raise_finite(rate);
                 }
             }
@@ -164,8 +166,9 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
         (changed, size)
     }
 
-    /// A Hamiltonian: momenta, the velocities that belong to them, coordinates, and then both rates anew. How much rates of coordinates have changed and how large they are, and
-    /// the same of rates of momenta.
+    /// One iteration for a Hamiltonian: momenta, the velocities that belong to them, coordinates, and then both rates
+    /// anew. Returns how much the rates of coordinates have changed and how large they are, and the same for the rates
+    /// of momenta.
     #[inline(always)]
     pub(crate) fn sweep_phase<V, A, M>(
         self,
@@ -243,7 +246,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                 let (force, rate) = (first.force[a] - first.q[a], first.z[a]);
                 of_forces.0.raise(force - like.with(forces[c][a]));
                 of_rates.0.raise(rate - like.with(rates[c][a]));
-                // What is not finite shows in the changes.
+                // A value that is not finite shows up in the changes.
                 of_forces.1.raise_finite(force);
                 of_rates.1.raise_finite(rate);
                 at.set(&mut forces[c][a], force);
@@ -254,7 +257,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
     }
 }
 
-/// low + h · a product with forces, which is zero where no forces are.
+/// low + h · a product with forces; the product is zero for coordinates without forces.
 #[inline(always)]
 fn with_product<V, M, const L: usize, const N: usize>(
     h: V,
@@ -271,7 +274,8 @@ where
     h.times_plus(h.with(products[a]), low)
 }
 
-/// M⁻¹ times what momenta lack: from products of the tables with forces, low words, and what the momenta are more than that at the start.
+/// M⁻¹ times the residual of the momenta, from products of the tables with forces, low words, and the differences of
+/// the momenta to those at the start.
 #[inline(always)]
 fn missing_velocity<V, A, M, const L: usize, const N: usize>(
     like: V,

@@ -1,10 +1,11 @@
-//! Which of the three forms of the equations a model has, and with which elements: known when it is compiled.
+//! Which of the three forms of the equations a model has, and with which elements; known at compile time.
 
 use crate::element::Element;
 use crate::model::{Form, Model};
 use crate::registers::storage::MAX_GROUPS;
 
-/// Whether there are points of that kind: for a nonlinear model without constraints, and an element of no more than 16 points that has the form.
+/// Whether all points can be iterated at once: for a nonlinear model without constraints, and an element with at most
+/// 16 points that has one of the forms.
 pub(crate) const fn are_possible<M, const N: usize>(element: &Element) -> bool
 where
     M: Model<N>,
@@ -13,7 +14,7 @@ where
     N > 0 && is_small && !M::FACTS.linear && M::CONSTRAINTS.is_empty() && has_form::<M, N>(element)
 }
 
-/// The coordinates that are iterated for: all that are not ignorable.
+/// The coordinates that take part in the iteration: all that are not ignorable.
 pub(crate) const fn acting<M, const N: usize>() -> [bool; N]
 where
     M: Model<N>,
@@ -42,7 +43,8 @@ where
     matches!(M::FORM, Form::Hamiltonian)
 }
 
-/// Whether the element has one of the three forms for the model as it was declared: all have but those that ask a Hamiltonian for velocities.
+/// Whether the element has one of the three forms for the model as it was declared: true unless the element requires
+/// velocities of a Hamiltonian.
 pub(crate) const fn has_form<M, const N: usize>(element: &Element) -> bool
 where
     M: Model<N>,
@@ -53,7 +55,7 @@ where
     }
 }
 
-/// Whether rates at more points than it has unknown ones are those of the element.
+/// Whether the rates at the points have to be projected, because there are more points than unknown rates.
 pub(crate) const fn is_projected<M, const N: usize>(element: &Element) -> bool
 where
     M: Model<N>,

@@ -1,4 +1,4 @@
-//! A constant mass matrix and its inverse, as iterations with all points at once use them.
+//! A constant mass matrix and its inverse, as the iterations with all points at once use them.
 
 use super::forms::is_second_order;
 use crate::double_double::DoubleDouble;
@@ -12,25 +12,25 @@ use crate::registers::storage::{List, Storage};
 /// A constant mass matrix.
 #[derive(Clone, Debug)]
 pub(crate) struct Inertia<const N: usize, S: Storage> {
-    /// Whether it has nothing beside its diagonal.
+    /// Whether it is diagonal.
     has_diagonal_alone: bool,
-    /// That diagonal; of no meaning where there is more.
+    /// The diagonal; without meaning if the matrix is not diagonal.
     pub(crate) masses: [f64; N],
-    /// The diagonal of the inverse; ones where that is not constant.
+    /// The diagonal of the inverse; ones if it is not constant.
     pub(crate) inverse_diagonal: [f64; N],
-    /// What rounding took from the inverse of the diagonal.
+    /// The rounding error of the diagonal of the inverse.
     pub(crate) inverse_low: [f64; N],
-    /// M⁻¹ (or H_pp), row by row; of no meaning where it is not constant, or diagonal.
+    /// M⁻¹ (or H_pp), row by row; without meaning if it is not constant, or diagonal.
     pub(crate) inverse: S::Square<N>,
-    /// The length of the step for which these are: h²/m where there is nothing beside the diagonal, and what rounding took from it.
+    /// The step length for which the next entries were computed: h²/m for a diagonal matrix, and its rounding error.
     step: f64,
     pub(super) reach: [f64; N],
     pub(super) reach_low: [f64; N],
 }
 
 impl<const N: usize, S: Storage> Inertia<N, S> {
-    /// M⁻¹ of a model, empty unless its mass matrix is constant; nothing if that is singular, or if momenta are no multiples of velocities
-    /// where they have to be.
+    /// M⁻¹ of a model, empty unless its mass matrix is constant; `None` if that is singular, or if momenta are not
+    /// multiples of velocities where they have to be.
     pub(crate) fn of<M>(model: &M) -> Option<Self>
     where
         M: Model<N>,
@@ -76,7 +76,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         })
     }
 
-    /// From the diagonal of L_vv or H_pp; nothing if a mass is zero, infinite or no number.
+    /// From the diagonal of L_vv or H_pp; `None` if a mass is zero or not finite.
     fn of_diagonal(given: [f64; N], form: Form) -> Option<Self> {
         let (mut masses, mut inverse, mut inverse_low) = ([0.0; N], [0.0; N], [0.0; N]);
         for a in 0..N {
@@ -103,13 +103,13 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         })
     }
 
-    /// Whether a constant mass matrix has nothing beside its diagonal: one number always has not.
+    /// Whether a constant mass matrix is diagonal; with one coordinate it always is.
     #[inline(always)]
     pub(crate) fn is_diagonal(&self) -> bool {
         N == 1 || self.has_diagonal_alone
     }
 
-    /// The constant M⁻¹ (or H_pp) times a vector for each of several points.
+    /// The constant M⁻¹ (or H_pp) times a vector, in each lane.
     #[inline(always)]
     pub(crate) fn times<V: Precise>(&self, like: V, vector: &[V; N]) -> [V; N] {
         let mut product = [like.like(0.0); N];
@@ -127,7 +127,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         product
     }
 
-    /// Sets how far accelerations reach in a step of length h.
+    /// Computes h²/m for steps of length h.
     #[inline(always)]
     pub(crate) fn set_step<V: Four>(&mut self, like: V, h: f64) {
         if !self.is_diagonal() || self.step == h {
@@ -146,7 +146,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         }
     }
 
-    /// One line of it times the numbers of a row.
+    /// One row of M⁻¹ times a vector.
     #[inline(always)]
     pub(crate) fn row<V: Side<L>, const L: usize>(
         &self,
@@ -166,7 +166,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         sum
     }
 
-    /// The same of a number and what rounding took from it.
+    /// The same for a vector with its rounding error.
     #[inline(always)]
     pub(super) fn of_both(&self, high: &[f64; N], low: &[f64; N]) -> ([f64; N], [f64; N]) {
         let (mut of_high, mut of_low) = ([0.0; N], [0.0; N]);
@@ -182,7 +182,7 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
     }
 }
 
-/// The diagonal of a matrix that has nothing else.
+/// The diagonal of a matrix, if it is diagonal.
 fn diagonal_of<const N: usize>(matrix: &[[f64; N]; N]) -> Option<[f64; N]> {
     let mut diagonal = [0.0; N];
     for a in 0..N {

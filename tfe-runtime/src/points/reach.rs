@@ -1,4 +1,5 @@
-//! How far a step goes, from the numbers at its points: boxes that its polynomials do not leave, for much less than these polynomials take (T-155).
+//! The reach of a step: boxes that contain its polynomials, computed from the values at its points at much less cost
+//! than the polynomials (T-155).
 
 use crate::basis::{MAX_RATES, MOST_OF_INTEGRALS};
 use crate::model::{Form, Model, State};
@@ -8,7 +9,7 @@ use crate::registers::storage::Heap;
 use crate::scheme::SchemeRef;
 use alloc::vec::Vec;
 
-/// A box that coordinates, and velocities (momenta of a Hamiltonian), do not leave all along a step.
+/// A box that contains the coordinates, and velocities (momenta of a Hamiltonian), during a whole step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach<const N: usize> {
     /// Bounds of coordinates.
@@ -17,13 +18,13 @@ pub struct Reach<const N: usize> {
     pub z: [(f64, f64); N],
 }
 
-/// What numbers at the points weigh, four to a group; zeros beyond the last.
+/// The weights of the values at the points, four to a group; zeros beyond the last point.
 #[derive(Clone, Debug)]
 pub(crate) struct Weights {
     groups: Vec<Group>,
     /// Σ integral
     whole: f64,
-    /// Σ value: no less than what interpolation makes of numbers that are one at most.
+    /// Σ value: a bound of the interpolating polynomial of values of magnitude at most one.
     most: f64,
 }
 
@@ -31,18 +32,18 @@ pub(crate) struct Weights {
 struct Group {
     /// b_l
     mean: [f64; 4],
-    /// No less than |∫₀^τ ℓ_l|, and than |ℓ_l|, of the Lagrange polynomials ℓ_l of the points.
+    /// Upper bounds of |∫₀^τ ℓ_l| and of |ℓ_l|, for the Lagrange polynomials ℓ_l of the points.
     integral: [f64; 4],
     value: [f64; 4],
     /// The largest |A_jl|.
     stage: [f64; 4],
 }
 
-/// What is added for roundings, relative to the numbers.
+/// An allowance for rounding errors, relative to the values.
 const ROUNDING: f64 = 1e-13;
 
 impl Weights {
-    /// Those of an element that is a Runge–Kutta method; none of others.
+    /// The weights of an element that is a Runge–Kutta method; `None` for others.
     pub(crate) fn of(scheme: &SchemeRef<'_>) -> Self {
         let points = if scheme.collocated {
             scheme.points()
@@ -53,7 +54,7 @@ impl Weights {
         let (mut whole, mut most) = (0.0, 0.0);
         for l in 0..points {
             let mut part = [0.0; 3];
-            // Legendre coefficients of ℓ_l: rates and forces have the same where points are unknowns.
+            // Legendre coefficients of ℓ_l: where the points are the unknowns, they are the same for rates and forces.
             for m in 0..scheme.rates().min(MAX_RATES) {
                 let at = m * points + l;
                 let size = scheme.rate[at].abs().max(scheme.force_rate[at].abs());
@@ -96,7 +97,7 @@ fn about(centre: f64, radius: f64) -> (f64, f64) {
 }
 
 impl<const N: usize> Points<N, Heap> {
-    /// That of the last step, h long, from its start; none without weights.
+    /// The reach of the last step, of length h, from its start; `None` without weights.
     #[inline(always)]
     pub(crate) fn reach<M: Model<N>>(
         &self,
@@ -112,7 +113,7 @@ impl<const N: usize> Points<N, Heap> {
             q: [(0.0, 0.0); N],
             z: [(0.0, 0.0); N],
         };
-        // |p − p₀| of the polynomial, over h, and |p_l − p₀| at the points.
+        // Bounds of |p − p₀| of the polynomial, divided by h, and of |p_l − p₀| at the points.
         let (mut forces, mut stages) = ([0.0; N], [0.0; N]);
         for (group, row) in weights.groups.iter().zip(&*self.forces) {
             for a in 0..N {

@@ -1,4 +1,5 @@
-//! M q̈ = f(q, q̇), forces as the only unknowns: one text for four points of a trajectory side by side and for eight trajectories.
+//! The iteration for equations of second order, M q̈ = f(q, q̇), whose only unknowns are the forces: one text for four
+//! points of a trajectory side by side and for eight trajectories.
 
 use super::arrangement::{Arrangement, Row, Size};
 use super::evaluation::Evaluation;
@@ -7,22 +8,22 @@ use crate::model::{Form, Model};
 use crate::precise::Precise;
 use crate::registers::side::Side;
 
-/// The unknowns and what their iteration needs; rows for each point or each group of points.
+/// The unknowns and the working memory of their iteration; rows for each point or each group of points.
 pub(crate) struct Forces<'a, X, const L: usize, const N: usize> {
     /// L_q + Q, or π: rates of the momenta.
     pub(crate) forces: &'a mut [Row<L, N>],
     /// A² f
     pub(crate) products: &'a mut [Row<L, N>],
     pub(crate) more_products: &'a mut [Row<L, N>],
-    /// How far the velocity at the start reaches.
+    /// The contribution of the velocity at the start.
     pub(crate) drift: &'a mut [Row<L, N>],
-    /// At the start, and what it lost by rounding.
+    /// The velocity at the start, and its rounding error.
     pub(crate) velocity: &'a [X; N],
     pub(crate) velocity_low: &'a [X; N],
 }
 
 impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
-    /// How far the velocity at the start reaches, to the working precision.
+    /// Computes the contribution of the velocity at the start, in working precision.
     #[inline(always)]
     pub(crate) fn set_drift<V, A, M>(self, like: V, at: &A)
     where
@@ -43,7 +44,8 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         }
     }
 
-    /// The same with what low words of state and tables add. The products are A² f, those with its low part follow here.
+    /// The same with the contributions of the low words of state and tables. The products have to be A² f; those with
+    /// the low part of A² are computed here.
     #[inline(always)]
     pub(crate) fn set_exact_drift<V, A, M>(self, like: V, at: &A)
     where
@@ -62,7 +64,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
             self.more_products,
         );
         let h = like.like(at.h());
-        // What the one rounding of h² takes, the same in every step.
+        // The rounding error of h², which is the same in every step.
         let (square, square_low) = h.product(h);
         let count = self.drift.len();
         let drift = &mut self.drift[..count];
@@ -94,7 +96,8 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         }
     }
 
-    /// One iteration: coordinates from products with the forces, forces at the coordinates. How much accelerations have changed, and how large they are.
+    /// One iteration: coordinates from products with the forces, then forces at the coordinates. Returns how much
+    /// accelerations have changed, and how large they are.
     #[inline(always)]
     pub(crate) fn sweep<V, A, M>(
         self,
@@ -159,10 +162,10 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                 } else {
                     given
                 };
-                // As accelerations: momenta of light and heavy bodies say nothing beside each other.
+                // Compared as accelerations: momenta of light and heavy bodies are not comparable.
                 let inverse = like.like(inertia.inverse_diagonal[a]);
                 changed.raise(inverse * (force - like.with(forces[c][a])));
-                // What is not finite shows in the change.
+                // A value that is not finite shows up in the change.
                 size.raise_finite(inverse * force);
                 at.set(&mut forces[c][a], force);
             }
@@ -199,7 +202,8 @@ fn positions<V, A, M, const DIAGONAL: bool, const L: usize, const N: usize>(
     }
 }
 
-/// The velocity of a momentum, and what it lost by rounding: the momentum belongs to no rounded velocity, and the rest counts as low word.
+/// The velocity that belongs to a momentum, and its rounding error: no floating-point velocity belongs exactly to the
+/// momentum.
 #[inline(always)]
 pub(crate) fn velocity_of<V: Precise>((p, p_low): (V, V), mass: V, inverse: V) -> (V, V) {
     let v = p * inverse;

@@ -1,4 +1,4 @@
-//! A step of one trajectory: start of the iteration, the iteration, the end.
+//! One step of one trajectory with all points at once: initial guess, iteration, end.
 
 use super::evaluation::{Evaluation, FEW, Placed};
 use super::forms::{acting, is_phase, is_second_order};
@@ -13,7 +13,7 @@ use crate::scheme;
 use crate::statistics::Contraction;
 
 impl<const N: usize, S: Storage> Points<N, S> {
-    /// A step of a stepper, with what it remembers.
+    /// A step, with the memory of the stepper.
     #[inline]
     pub(crate) fn step<M>(
         &mut self,
@@ -38,7 +38,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
     }
 }
 
-/// A step to be done.
+/// A step to be made.
 struct Job<'a, M, T, A, S: Storage, const N: usize> {
     pub(super) points: &'a mut Points<N, S>,
     pub(super) model: &'a M,
@@ -56,7 +56,7 @@ where
     T: scheme::Tables,
     A: Asked,
 {
-    /// In the registers of the processor, all of it one function.
+    /// Runs the step in registers of the processor, as one function.
     #[inline(always)]
     pub(super) fn run(self) -> Together {
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -123,7 +123,7 @@ where
         }
         let (end, end_low) = outcome.end;
         (points.is_warm, points.last_step) = (true, h);
-        // In place: with many coordinates copies of it take time.
+        // In place: with many coordinates, copies take time.
         let last = memory.last.get_or_insert(Last::NONE);
         (last.t, last.h) = (t, h);
         (last.start, last.start_low, last.end) = (*state, memory.low, end);
@@ -135,7 +135,8 @@ where
     }
 }
 
-/// A step where there are no registers. Not written into the place of its call, of which there are several; and by its parts, which then need not lie in memory for it.
+/// A step without wide registers. Not inlined, because it has several callers; its arguments are passed one by one, so
+/// that they need not be in memory.
 #[inline(never)]
 fn step_apart<M, T, A, S: Storage, const N: usize>(
     points: &mut Points<N, S>,
@@ -169,9 +170,9 @@ struct Iteration<'a, M, S: Storage, const N: usize> {
     control: Control,
     /// Time and length.
     place: (f64, f64),
-    /// The start, and what it is more than its rounded numbers.
+    /// The start and its rounding error.
     start: (&'a State<N>, &'a State<N>),
-    /// Newton's method may follow.
+    /// Whether Newton's method can take over.
     yielding: bool,
 }
 
@@ -179,7 +180,7 @@ impl<M, S: Storage, const N: usize> Iteration<'_, M, S, N>
 where
     M: Model<N>,
 {
-    /// From its start to the end of the step.
+    /// From the start to the end of the step.
     #[inline(always)]
     fn run<V: Placed>(self, like: V) -> Outcome<N> {
         let Self {
@@ -197,7 +198,7 @@ where
             if const { is_second_order::<M, N>() || is_phase::<M, N>() } {
                 (points.tables.continued()).apply(like, acting, &points.forces, &mut work.forces);
             } else {
-                // The first iteration takes what low words of the tables make of them.
+                // The first iteration uses them to compute the contributions of the low words of the tables.
                 work.forces.copy_from_slice(&points.forces);
             }
             if const { !is_second_order::<M, N>() } {
@@ -249,7 +250,7 @@ where
             _ => new_place.insert(Evaluation::zero(like)),
         };
         while iterations < most {
-            // Constant conditions, so that of the three iterations one is compiled.
+            // The conditions are constants, so that only one of the three iterations is compiled.
             let increment = if const { is_second_order::<M, N>() } {
                 work.sweep_second_order::<V, M>(like, model, &leg, at)
             } else if const { is_phase::<M, N>() } {
@@ -266,7 +267,8 @@ where
                 Ok(Verdict::GoOn) => {}
                 Err(_) => break,
             }
-            // The start is good to a few digits, so one evaluation of mass matrices mostly serves.
+            // The initial guess is accurate to a few digits, so that one evaluation of the mass matrices usually
+            // suffices.
             refresh = monitor.rate() > 0.1;
             let is_hopeless =
                 yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1);
@@ -278,7 +280,7 @@ where
             }
         }
         converged |= monitor.is_at_round_off();
-        // No closures here: they would be compiled for the instruction set of the crate, not for that of the place of the call.
+        // No closures here: they would be compiled for the instruction set of the crate and not for that of the caller.
         let evidence = monitor.evidence(yielding).check(control.solve);
         let (mut end, mut failure) = ((State::ZERO, State::ZERO), None);
         if converged && evidence.is_ok() {
@@ -295,7 +297,7 @@ where
                 work.finish::<V, true>(like, &leg, place);
             }
             if is_finite(&end.0) {
-                // What a failed step would have to start from is kept until here.
+                // Until here the old forces are kept, because a failed step would have to start from them.
                 points.forces.take(&mut work.forces);
                 points.rates.take(&mut work.rates);
                 points.velocity = work.velocity;

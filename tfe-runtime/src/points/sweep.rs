@@ -1,4 +1,4 @@
-//! What all iterations share, and how points of one trajectory lie side by side.
+//! What all iterations have in common, and the arrangement of the points of one trajectory.
 
 use super::arrangement::{Arrangement, Size};
 use super::evaluation::Evaluation;
@@ -14,7 +14,8 @@ use crate::precise::Precise;
 use crate::registers::four::{Four, block, put};
 use crate::registers::storage::{Fixed, Matrix, Storage};
 
-/// The largest magnitude so far in each lane. NaN is left out: the end of a step is not finite where one of its forces is not, and that is looked at once a step.
+/// The largest magnitude so far in each lane. NaN is ignored: if a force is not finite, the end of the step is not
+/// finite, which is checked once for each step.
 #[derive(Clone, Copy)]
 pub(crate) struct Magnitude<V>(V);
 
@@ -36,7 +37,7 @@ impl<V: Four> Size<V> for Magnitude<V> {
 }
 
 impl<V: Four> Magnitude<V> {
-    /// Of all lanes of two.
+    /// The largest magnitudes of two, over all lanes.
     #[inline(always)]
     fn of_both(one: Self, other: Self) -> (f64, f64) {
         let ([a, b, c, d], [e, f, g, h]) = (one.0.lanes(), other.0.lanes());
@@ -46,7 +47,7 @@ impl<V: Four> Magnitude<V> {
     }
 }
 
-/// The largest magnitude so far in each lane, and a sum that shows what is no number.
+/// The largest magnitude so far in each lane, and a sum that becomes NaN if a value is not finite.
 #[cfg(feature = "alloc")]
 #[derive(Clone, Copy)]
 pub(crate) struct Largest<V> {
@@ -79,13 +80,13 @@ impl<V: Precise> Size<V> for Largest<V> {
 
 #[cfg(feature = "alloc")]
 impl<V: Precise> Largest<V> {
-    /// One for each lane; NaN where one value of that lane was not finite.
+    /// One value for each lane; NaN where one value of that lane was not finite.
     #[inline(always)]
     pub(crate) fn by_lane(self) -> V {
         self.size + self.sum * self.sum.like(0.0)
     }
 
-    /// Of all lanes; NaN if one value was not finite.
+    /// The maximum of all lanes; NaN if one value was not finite.
     #[inline(always)]
     pub(crate) fn get(self) -> f64
     where
@@ -96,13 +97,13 @@ impl<V: Precise> Largest<V> {
     }
 }
 
-/// The larger one; in one instruction, which nothing asks about NaN.
+/// The larger of two numbers, in one instruction; neither may be NaN.
 #[inline(always)]
 pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a < b { b } else { a }
 }
 
-/// |h δ| over the larger one of start and |h x|; zero over zero is zero, NaN stays NaN.
+/// |h δ| divided by the larger of |start| and |h x|; 0/0 is zero, and NaN stays NaN.
 #[inline(always)]
 pub(crate) fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
     let scale = start.max(h.abs() * x);
@@ -198,7 +199,7 @@ impl<V: Four, const N: usize, S: Storage> Arrangement<V, 4, N> for Leg<'_, N, S>
 }
 
 impl<const N: usize, S: Storage> Work<N, S> {
-    /// The rows of equations of first order.
+    /// The rows for equations of first order.
     #[inline(always)]
     pub(super) fn rows(&mut self) -> Rows<'_, 4, N> {
         Rows {
@@ -214,7 +215,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         }
     }
 
-    /// The rows of M q̈ = f.
+    /// The rows for M q̈ = f.
     #[inline(always)]
     pub(super) fn accelerated(&mut self) -> Forces<'_, f64, 4, N> {
         Forces {
@@ -227,7 +228,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         }
     }
 
-    /// Velocity at the start, and what it lost by rounding.
+    /// Computes the velocity at the start, and its rounding error.
     #[inline(always)]
     pub(super) fn begin_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
         let inertia = &leg.inertia;
@@ -262,7 +263,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         (leg.tables.twice).apply(like, acting, &self.forces, &mut self.products);
     }
 
-    /// An iteration of the forces of M q̈ = f.
+    /// One iteration for the forces of M q̈ = f.
     #[inline(always)]
     pub(super) fn sweep_second_order<V: Four, M>(
         &mut self,
@@ -284,12 +285,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
         let distance = larger(self.distance, h * (self.speed + h * size));
         let velocity = h * changed / speed;
         let position = h * (0.5 * h * changed) / distance;
-        // Both are NaN, or none is.
+        // Either both are NaN or neither.
         let relative = larger(velocity, position);
         Increment { relative, position }
     }
 
-    /// An iteration of a Lagrangian's velocities.
+    /// One iteration for the velocities of a Lagrangian.
     #[inline(always)]
     pub(super) fn sweep_velocity<V: Four, M>(
         &mut self,
@@ -305,8 +306,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
         let (changed, size) = (self.rows()).sweep_velocity(like, model, leg, at, refresh);
         let (changed, size) = Magnitude::of_both(changed, size);
         let position = relative(leg.h, self.distance, size, changed);
-        // The momentum at the end is as good as the velocities, whatever the step; what is left of an increment reaches it through forces
-        // only, hence the factor.
+        // The momentum at the end is as accurate as the velocities, whatever the step. The rest of an increment affects
+        // it through the forces only, hence the factor.
         let velocity = 0.25 * relative(1.0, 0.0, size, changed);
         let relative = if velocity > position {
             velocity
@@ -316,7 +317,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
         Increment { relative, position }
     }
 
-    /// An iteration of a Hamiltonian's rates.
+    /// One iteration for the rates of a Hamiltonian.
     #[inline(always)]
     pub(super) fn sweep_phase<V: Four, M>(
         &mut self,

@@ -1,4 +1,4 @@
-//! The tables of an element, their rows in groups of four points.
+//! The tables of an element, with their rows in groups of four points.
 
 use crate::basis::{MAX_NODES, MAX_RATES, exact_integrals, exact_legendre};
 use crate::double_double::DoubleDouble;
@@ -9,7 +9,7 @@ use crate::registers::storage::{
 };
 use crate::scheme::{self, Scheme, SchemeRef};
 
-/// Sets the columns of a matrix given row by row.
+/// Sets the columns of a matrix that is given row by row.
 const fn set_columns(points: usize, row_by_row: &[f64], columns: &mut [[f64; 4]]) {
     let groups = points.div_ceil(4);
     let mut j = 0;
@@ -33,7 +33,7 @@ const fn set_weights(high: &[f64], low: &[f64], groups: &mut [[[f64; 4]; 2]]) {
     }
 }
 
-/// The numbers of these tables, to be filled.
+/// The memory for these tables.
 pub(super) struct Target<'a> {
     pub(super) nodes: &'a mut [[f64; 4]],
     pub(super) reach: &'a mut [[f64; 4]],
@@ -48,27 +48,27 @@ pub(super) struct Target<'a> {
     pub(super) projection: Option<ProjectionTarget<'a>>,
 }
 
-/// Those of a projection.
+/// The memory for those of a projection.
 pub(super) struct ProjectionTarget<'a> {
     pub(super) position: &'a mut [[f64; 4]],
     pub(super) position_low: &'a mut [[f64; 4]],
     pub(super) onto_rates: &'a mut [[f64; 4]],
 }
 
-/// The most points.
+/// The largest number of points.
 const MAX_POINTS: usize = 4 * MAX_GROUPS;
 
 type Square = [[DoubleDouble; MAX_POINTS]; MAX_POINTS];
 const NO_SQUARE: Square = [[DoubleDouble::ZERO; MAX_POINTS]; MAX_POINTS];
 
-/// What an element makes of numbers at its points, to twice the precision.
+/// The matrices by which an element integrates values at its points, in twice the working precision.
 struct Integration {
     points: usize,
-    /// Rates to coordinates: C P.
+    /// From rates to coordinates: C P.
     position: Square,
-    /// Rates of momenta to momenta: E G.
+    /// From rates of momenta to momenta: E G.
     momentum: Square,
-    /// Numbers to the nearest rates: E P; empty where that is one.
+    /// From values to the nearest rates: E P; empty if that is the unit matrix.
     onto_rates: Square,
 }
 
@@ -101,7 +101,8 @@ impl Integration {
         new
     }
 
-    /// For rates of degree s − 1 at more than s points. With their Legendre coefficients, (2m + 1) Σ_l b_l P_m(c_l) v_l, the matrices of the scheme drop out.
+    /// The matrices for rates of degree s − 1 at more than s points. By way of the Legendre coefficients, (2m + 1) Σ_l
+    /// b_l P_m(c_l) v_l, the matrices of the scheme are not needed.
     const fn project(&mut self, element: &Element) {
         let (rule, rates) = (element.quadrature_rule(), element.degree());
         let mut values = [[DoubleDouble::ZERO; MAX_NODES]; MAX_POINTS];
@@ -137,7 +138,7 @@ impl Integration {
         }
     }
 
-    /// C G: what two integrations make of accelerations.
+    /// C G: the double integral of accelerations.
     const fn twice(&self) -> Square {
         let mut product = NO_SQUARE;
         let mut i = 0;
@@ -157,7 +158,7 @@ impl Integration {
         product
     }
 
-    /// Writes a matrix, and what rounding takes from it where that is wanted.
+    /// Writes a matrix, and its rounding error if that is requested.
     const fn write(&self, matrix: &Square, high: &mut [[f64; 4]], low: Option<&mut [[f64; 4]]>) {
         let mut rows = [[0.0; MAX_POINTS * MAX_POINTS]; 2];
         let mut i = 0;
@@ -243,7 +244,7 @@ impl<
             onto_rates: Matrix::of([[[0.0; 4]; C]; K]),
         };
 
-    /// Of an element of K points; of no use where K is zero.
+    /// The tables of an element with K points; without use where K is zero.
     #[must_use]
     pub const fn new<const POINTS: usize, const U: usize>(scheme: &Scheme<POINTS, U>) -> Self {
         let (table, row) = ([[[0.0; 4]; C]; K], [[0.0; 4]; C]);
@@ -312,11 +313,11 @@ impl<
     }
 }
 
-/// All tables of an element, and what continues the last one.
+/// All tables of an element, and the extrapolation matrix from the last element.
 #[derive(Clone, Debug)]
 pub struct Tables<S: Storage> {
     fixed: S::Fixed,
-    /// From the last element to this one, for steps of the ratio that follows; those of ratio one are among the others.
+    /// The extrapolation matrix for steps of the ratio in the next field; that for ratio one is among the fixed tables.
     other: Option<Matrix<S>>,
     ratio: f64,
 }
@@ -330,25 +331,25 @@ impl<S: Storage> Tables<S> {
         }
     }
 
-    /// From the last element to this one.
+    /// The extrapolation matrix from the last element to this one.
     #[inline(always)]
     pub(crate) fn continued(&self) -> &Matrix<S> {
         self.other.as_ref().unwrap_or(&self.fixed.continued)
     }
 
-    /// Makes `continued` that of a step of length `h` after one of length `last`.
+    /// Makes `continued` the matrix for a step of length `h` after one of length `last`.
     #[inline(always)]
     pub(crate) fn continue_with(&mut self, scheme: &impl scheme::Tables, h: f64, last: f64) {
-        // Mostly there is nothing to divide.
+        // Usually no division is needed.
         if h != last || self.ratio != 1.0 {
             self.set_ratio(scheme, h / last);
         }
     }
 
-    /// Makes `continued` that of steps of this ratio.
+    /// Makes `continued` the matrix for steps of this ratio.
     #[inline]
     pub(crate) fn set_ratio(&mut self, scheme: &impl scheme::Tables, ratio: f64) {
-        // Far outside the last element its polynomial says nothing; backwards it may be reused.
+        // Far outside the last element its polynomial is useless; backwards in time it may be reused.
         let ratio = continued_ratio(ratio);
         if self.ratio != ratio {
             self.continue_by(&scheme.view(), ratio);

@@ -1,4 +1,4 @@
-//! Four points side by side.
+//! Scalars of four numbers side by side, one for each of four points.
 
 use super::side::Side;
 use super::storage::{Matrix, Row, Storage};
@@ -8,7 +8,7 @@ use crate::model::{First, Model};
 use crate::precise::Precise;
 use crate::real::{Real, fused};
 
-/// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
+/// Work in a function of its own, which is compiled for the instruction set of the numbers with which it computes.
 pub(crate) trait Apart {
     fn run<V: Four>(self, like: V);
 }
@@ -43,7 +43,7 @@ pub(crate) trait Four: Side<4> {
         (self.cos(), other.cos())
     }
 
-    /// The product of a table with a vector over the points, for every coordinate that is wanted.
+    /// The product of a table with a vector over the points, for every coordinate that is requested.
     fn apply<S: Storage, const N: usize>(
         self,
         matrix: &Matrix<S>,
@@ -52,7 +52,7 @@ pub(crate) trait Four: Side<4> {
         products: &mut [Row<N>],
     );
 
-    /// Rows from columns.
+    /// The transposed 4 × 4 matrix.
     #[inline(always)]
     fn transposed(rows: [Self; 4]) -> [Self; 4] {
         let (mut lanes, mut columns) = ([[0.0; 4]; 4], rows);
@@ -101,7 +101,7 @@ pub(crate) fn block<V: Four>(like: V, numbers: &[f64], at: usize) -> V {
     like.with(four)
 }
 
-/// Writes them back, as far as there are so many.
+/// Writes four numbers back, or as many as there are.
 #[inline(always)]
 pub(crate) fn put<V: Four>(four: V, numbers: &mut [f64], at: usize) {
     if let Some(place) = numbers[at..].first_chunk_mut() {
@@ -144,9 +144,9 @@ impl Side<4> for Lanes<4> {
     }
 }
 
-/// On every processor: the arithmetic in vectors as the compiler likes, the kernel for one point after the other.
+/// For every processor: the compiler vectorises the arithmetic, and the kernel is called for one point after the other.
 impl Four for Lanes<4> {
-    /// Called and not inlined: what few processors run need not be compiled at every place of every model.
+    /// Not inlined: code that few processors run need not be compiled for every caller in every model.
     #[inline(never)]
     fn apply<S: Storage, const N: usize>(
         self,
@@ -173,7 +173,7 @@ impl Four for Lanes<4> {
     ) where
         M: Model<N>,
     {
-        // A lane of its own has the sines of all lanes; a plain number has those of the system, which differ in the last digit.
+        // A number in a lane has our own sines; a plain number has those of the system, which differ in the last digit.
         if M::LANES {
             each_point::<Lanes<1>, M, N>(model, t, q, z, first, None);
         } else {
@@ -200,7 +200,7 @@ impl Four for Lanes<4> {
     }
 }
 
-/// One number.
+/// A single number.
 pub(super) trait One: Real {
     fn value(self) -> f64;
 }

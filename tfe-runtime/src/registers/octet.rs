@@ -22,7 +22,7 @@ impl Octet {
         (above.0 & below.0) == u8::MAX
     }
 
-    /// Whether a number is positive.
+    /// Whether at least one number is positive.
     #[inline(always)]
     pub(crate) fn any_positive(self) -> bool {
         self.isa

@@ -1,5 +1,5 @@
-//! Eight numbers: one register, or two of four. Written side by side the operations of two overlap, where one chain of them would wait for
-//! itself.
+//! Scalars of eight numbers: one register, or two registers of four. The operations of the two overlap in the
+//! processor, where a single chain of operations would wait for itself.
 
 use crate::precise::Precise;
 use crate::real::Real;
@@ -7,12 +7,12 @@ use crate::registers::four::{self, Four};
 use crate::registers::side::Side;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// So many trajectories share a kernel call.
+/// The number of trajectories that share a kernel call.
 pub const LANES: usize = 8;
 
 /// Eight numbers, one for each of eight trajectories.
 pub trait Eight: Side<LANES> {
-    /// Whether a number is positive; of numbers that are no NaN.
+    /// Whether at least one number is positive; none may be NaN.
     #[inline(always)]
     fn any_positive(self) -> bool {
         let mut largest = 0.0;
@@ -26,7 +26,7 @@ pub trait Eight: Side<LANES> {
     fn apart<W: Apart>(self, work: W);
 }
 
-/// Work that is compiled apart from the places where it is called, for the instruction set of the numbers with which it computes.
+/// Work in a function of its own, which is compiled for the instruction set of the numbers with which it computes.
 pub trait Apart {
     fn run<V: Eight>(self, like: V);
 }

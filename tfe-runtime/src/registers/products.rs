@@ -1,11 +1,11 @@
-//! Products of the tables of an element with numbers at its points.
+//! Products of the tables of an element with values at its points.
 
 use super::four::Four;
 use super::storage::{MAX_GROUPS, Matrix, Row, Storage, Weights};
 use crate::precise::{Precise, add_exactly, exact_term};
 
 impl<S: Storage> Matrix<S> {
-    /// The product with a vector over the points for every coordinate that is wanted; the others stay as they are.
+    /// The product with a vector over the points, for every coordinate that is requested; the others are unchanged.
     #[inline(always)]
     pub(crate) fn apply<V: Four, const N: usize>(
         &self,
@@ -25,12 +25,13 @@ impl<S: Storage> Matrix<S> {
         rows: &[Row<N>],
         products: &mut [Row<N>],
     ) {
-        // Without optimisation nothing is gained by a text for each number of groups, and a third of the time of compiling is lost.
+        // Without optimisation, a separate text for each number of groups gains nothing and costs a third of the
+        // compile time.
         if const { S::GROUPS == 0 } && cfg!(debug_assertions) {
             self.apply_in_turn(like, wanted, rows, products);
             return;
         }
-        // Conditions that are constants, so that of a known size one is compiled.
+        // The conditions are constants, so that for a known size only one branch is compiled.
         if const { S::GROUPS == 1 } || const { S::GROUPS == 0 } && rows.len() == 1 {
             self.apply_to::<V, N, 1>(like, wanted, rows, products);
         } else if const { S::GROUPS == 2 } || const { S::GROUPS == 0 } && rows.len() == 2 {
@@ -42,7 +43,7 @@ impl<S: Storage> Matrix<S> {
         }
     }
 
-    /// The same to the bit for any number of groups, in the least code.
+    /// The same to the last bit for any number of groups, with the least code.
     #[inline(always)]
     fn apply_in_turn<V: Four, const N: usize>(
         &self,
@@ -89,9 +90,9 @@ impl<S: Storage> Matrix<S> {
         else {
             return;
         };
-        // Two sums, of even and of odd columns: with few coordinates, additions in a row are what takes time.
+        // Two sums, of even and of odd columns: with few coordinates, the latency of successive additions dominates.
         if let ([whole], []) = (whole.as_chunks::<C>().0, rest) {
-            // Groups without gaps are written out by the compiler.
+            // The compiler unrolls loops over groups without gaps.
             for a in 0..N {
                 if !wanted[a] {
                     continue;
@@ -117,7 +118,7 @@ impl<S: Storage> Matrix<S> {
             }
             if let Some(row) = rows.get(whole.len()) {
                 let (even, [x, y, z, _]) = (&mut sums[0], &row[a]);
-                // Written out: with few points a loop takes longer than what is in it.
+                // Unrolled: with few points, a loop takes longer than its body.
                 match rest {
                     [] => {}
                     [one] => add_column(like, even, one, *x),
@@ -125,7 +126,7 @@ impl<S: Storage> Matrix<S> {
                         add_column(like, even, one, *x);
                         add_column(like, even, two, *y);
                     }
-                    // Of four there would be one more that is whole.
+                    // Four would be another whole block.
                     [one, two, three, ..] => {
                         add_column(like, even, one, *x);
                         add_column(like, even, two, *y);
@@ -139,7 +140,7 @@ impl<S: Storage> Matrix<S> {
         }
     }
 
-    /// The columns one after the other, in groups of four lines.
+    /// The columns one after the other, in groups of four rows.
     #[cfg(feature = "alloc")]
     #[inline(always)]
     pub(crate) fn groups(&self) -> &[[f64; 4]] {
@@ -199,10 +200,11 @@ fn add_column<V: Four, const C: usize>(
 }
 
 impl<S: Storage> Weights<S> {
-    /// Σ weight · value over the points of four coordinates at most from `from` on, and what rounding takes from it.
+    /// Σ weight · value over the points, for at most four coordinates from `from` on, and its rounding error.
     ///
-    /// This is what all steps add up. With products of one rounding each, the energy of a Kepler orbit drifts ten times as fast: weights
-    /// and step are the same numbers in every step, and what their products lose is no chance. Without `EXACT` that is left out.
+    /// These sums are added up over all steps. If their products were rounded once, the energy of a Kepler orbit would
+    /// drift ten times as fast: weights and step are the same numbers in every step, so that the rounding errors of
+    /// their products are systematic. Without `EXACT` the rounding errors are not computed.
     #[inline(always)]
     pub(crate) fn sums<V: Four, const N: usize, const EXACT: bool>(
         &self,
@@ -218,11 +220,12 @@ impl<S: Storage> Weights<S> {
                 add_term::<_, EXACT>(&mut sums[a], weight, value, group == 0);
             }
         }
-        // From a register for each coordinate to one for each of four points.
+        // From one register for each coordinate to one for each of four points.
         sum_of_lanes::<_, EXACT>(sums)
     }
 
-    /// The sums of all coordinates, and those that other weights make of other numbers: [q, p, q, p] of one coordinate, [q₁, q₂, p₁, p₂] of two.
+    /// The sums of all coordinates, beside the sums of other values with other weights: [q, p, q, p] for one
+    /// coordinate, [q₁, q₂, p₁, p₂] for two.
     #[inline(always)]
     pub(crate) fn sums_beside<V: Four, const N: usize, const EXACT: bool>(
         &self,
@@ -248,7 +251,7 @@ impl<S: Storage> Weights<S> {
         sum_of_lanes::<_, EXACT>(sums)
     }
 
-    /// The weight of one point and what rounding took from it.
+    /// The weight of one point and its rounding error.
     #[cfg(feature = "alloc")]
     #[inline(always)]
     pub(crate) fn of(&self, point: usize) -> (f64, f64) {
@@ -257,7 +260,7 @@ impl<S: Storage> Weights<S> {
     }
 }
 
-/// A weight and what rounding took from it, of four points.
+/// The weights of four points and their rounding errors.
 #[inline(always)]
 fn both<V: Four>(like: V, [weight, low]: &[[f64; 4]; 2]) -> (V, V) {
     (like.with(*weight), like.with(*low))
@@ -280,7 +283,7 @@ fn add_term<V: Precise, const EXACT: bool>(
     }
 }
 
-/// The sum over the lanes of each of four.
+/// For each of four registers, the sum over its lanes.
 #[inline(always)]
 fn sum_of_lanes<V: Four, const EXACT: bool>(sums: [(V, V); 4]) -> (V, V) {
     let [a, b, c, d] = sums;
@@ -290,7 +293,7 @@ fn sum_of_lanes<V: Four, const EXACT: bool>(sums: [(V, V); 4]) -> (V, V) {
     )
 }
 
-/// The sum of four numbers and what rounding takes from it, and from each.
+/// The sum of four numbers with their rounding errors, and its own rounding error.
 #[inline(always)]
 fn sum_of<V: Precise, const EXACT: bool>([a, b, c, d]: [V; 4], [e, f, g, h]: [V; 4]) -> (V, V) {
     if const { !EXACT } {

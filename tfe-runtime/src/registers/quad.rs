@@ -1,9 +1,12 @@
-//! Numbers in registers of the processor, chosen at run time: four with AVX2.
+//! Scalars in registers of the processor, chosen at run time: four numbers with AVX2.
 //!
-//! The operations are those of IEEE 754, so that a kernel gives the same digits as with plain numbers. Products with tables and the polynomials of sines and exponentials are fused with
-//! the sums that follow, and so they are without these registers ([`fused`](crate::real::fused)), where that is a call of a function on old processors; sine
-//! and cosine are those of [`trigonometry`](crate::trigonometry), exponential, logarithm, hyperbolic tangent and power those of [`exponential`](crate::exponential), angles those of [`arctangent`](crate::arctangent). Code that computes with these numbers has to be compiled for that
-//! instruction set, hence everything is written into the place of its call, and the outermost call goes through [`pulp`].
+//! The operations are those of IEEE 754, so that a kernel gives the same digits as with plain numbers. Products with
+//! tables, and the polynomials of sines and exponentials, use fused multiply-adds. Without these registers they do as
+//! well ([`fused`](crate::real::fused)), although on old processors that is a function call. Sine and cosine are those
+//! of [`trigonometry`](crate::trigonometry); exponential, logarithm, hyperbolic tangent and power those of
+//! [`exponential`](crate::exponential); angles those of [`arctangent`](crate::arctangent). Code that computes with
+//! these numbers has to be compiled for that instruction set; therefore everything is inlined, and the outermost call
+//! goes through [`pulp`].
 
 use crate::real::Real;
 use crate::registers::four::Apart;
@@ -12,7 +15,7 @@ use crate::trigonometry::{LIMIT, Turn, cos_of_small, reduced, sin_of_small};
 use pulp::x86::V3;
 use pulp::{Simd, f64x4, m64x4, u64x4};
 
-/// Numbers that fill a register of an instruction set.
+/// Defines a type of numbers that fill a register of an instruction set.
 macro_rules! register {
     (
         $(#[$doc:meta])*
@@ -46,7 +49,7 @@ macro_rules! register {
                 pulp::cast(self.value)
             }
 
-            /// What has no instruction, one lane after the other.
+            /// A function without an instruction of its own, applied to one lane after the other.
             #[inline(always)]
             fn each(self, function: impl Fn(f64) -> f64) -> Self {
                 let mut lanes = self.lanes();
@@ -56,7 +59,7 @@ macro_rules! register {
                 self.with(lanes)
             }
 
-            /// What was found for arguments within limits, and a function of the lanes that are outside.
+            /// `found`, with the lanes whose argument is outside the limits replaced by a scalar function.
             #[inline(always)]
             fn or_by_lanes(
                 self,
@@ -72,7 +75,7 @@ macro_rules! register {
                 self.with(found)
             }
 
-            /// What was found where two numbers are within limits, and a function of the lanes that are outside.
+            /// The same for functions of two arguments, each with its limits.
             #[inline(always)]
             fn or_by_lanes_of_two(
                 self,
@@ -105,7 +108,7 @@ macro_rules! register {
         }
 
         impl crate::precise::Precise for $name {
-            /// By a fused instruction the second is exact.
+            /// With a fused multiply-add the second number, the rounding error, is exact.
             #[inline(always)]
             fn product(self, other: Self) -> (Self, Self) {
                 let high = self.isa.mul_f64s(self.value, other.value);
@@ -125,7 +128,7 @@ macro_rules! register {
                 Self { value, ..self }
             }
 
-            /// Of a NaN and a number, the second.
+            /// Of a NaN and another number, the second operand.
             #[inline(always)]
             fn larger(self, other: Self) -> Self {
                 let value = self.isa.max_f64s(self.value, other.value);
@@ -165,7 +168,7 @@ macro_rules! register {
 
             #[inline(always)]
             fn from_f64(value: f64) -> Self {
-                // Slow, and only for kernels written by hand: `like` needs no question.
+                // Slow, and only for kernels written by hand: `like` need not detect the processor.
                 let isa = $isa::try_new().expect("these numbers exist on processors that have them only");
                 Self::of(isa, [value; $count])
             }
@@ -265,7 +268,7 @@ macro_rules! register {
                 self.or_by_lanes_of_two(exponent, found, limits, <f64 as crate::real::Real>::powf)
             }
 
-            /// A NaN stays one, and a zero what it is.
+            /// NaN and zeros are returned unchanged.
             #[inline(always)]
             fn sign(self) -> Self {
                 let (zero, one) = (self.like(0.0), self.like(1.0));
@@ -273,7 +276,7 @@ macro_rules! register {
                 Self::select(zero.less(self), one, negative)
             }
 
-            /// A NaN on either side is not lost.
+            /// A NaN in either operand is kept.
             #[inline(always)]
             fn min(self, other: Self) -> Self {
                 let smaller = Self::select(other.less(self), other, self);
@@ -415,7 +418,7 @@ register! {
     f64x4, m64x4, u64x4, mul_sub_f64x4, mul_add_f64x4, shl_const_u64x4, shr_const_u64x4
 }
 
-/// Lanes of two registers in one.
+/// Defines an interleaving of the lanes of two registers.
 macro_rules! interleaved {
     ($($(#[$doc:meta])* $name:ident: $instruction:ident $($which:literal)?;)*) => {$(
         $(#[$doc])*
@@ -440,11 +443,11 @@ impl Quad {
         upper: _mm256_permute2f128_pd 0x31;
     }
 
-    /// The lanes within limits.
+    /// The mask of lanes within the limits.
     #[inline(always)]
     fn within(self, (low, high): (f64, f64)) -> m64x4 {
         let (isa, high_value) = (self.isa, self.like(high).value);
-        // Constants: one comparison does where limits are opposite.
+        // The limits are constants: one comparison suffices if they are opposite.
         if low == -high {
             return isa.less_than_or_equal_f64s(isa.abs_f64s(self.value), high_value);
         }
@@ -464,7 +467,7 @@ impl Quad {
         self.has_all(self.within(limits))
     }
 
-    /// Rows from columns, in eight instructions: of lanes written down one by one the compiler makes nineteen.
+    /// The transposed matrix, in eight instructions; from code that handles lane by lane the compiler makes nineteen.
     #[inline(always)]
     pub(crate) fn transposed([a, b, c, d]: [Self; 4]) -> [Self; 4] {
         let (first, second) = (a.even(b), a.odd(b));
@@ -486,7 +489,7 @@ impl Quad {
         });
     }
 
-    /// Whether all lanes of both have sines of these modules.
+    /// Whether all arguments of both are within the limits of `trigonometry`.
     #[inline(always)]
     fn are_turns(self, other: Self) -> bool {
         let limits = (-LIMIT, LIMIT);

@@ -1,4 +1,4 @@
-//! Four points in a register of the processor.
+//! Four points in one register of the processor.
 
 use super::four::{Apart, Four, each_point};
 use super::side::Side;
@@ -19,7 +19,7 @@ impl Side<4> for Quad {
     }
 }
 
-/// In registers of the processor, the kernel for all four points at once.
+/// In registers of the processor, the kernel is called for all four points at once.
 impl Four for Quad {
     #[inline(always)]
     fn apply<S: Storage, const N: usize>(
@@ -93,7 +93,7 @@ impl Four for Quad {
     }
 }
 
-/// A kernel that is not made for registers, for one point after the other.
+/// Calls a kernel that is not made for registers for one point after the other.
 #[inline(always)]
 fn in_turn<V: Four, M, const N: usize>(
     t: V,

@@ -1,8 +1,8 @@
-//! Numbers side by side: in registers while something is computed, in memory between.
+//! Numbers side by side: in registers during computations, in memory between them.
 
 use crate::precise::Precise;
 
-/// So many numbers in registers: one for each of four points, or of eight trajectories.
+/// A fixed number of values in registers: one for each of four points, or of eight trajectories.
 pub trait Side<const LANES: usize>: Precise {
     /// The same kind of numbers with these values.
     fn with(self, lanes: [f64; LANES]) -> Self;
@@ -11,7 +11,7 @@ pub trait Side<const LANES: usize>: Precise {
     fn lanes(self) -> [f64; LANES];
 }
 
-/// A row of memory in registers.
+/// Loads a row from memory into registers.
 #[cfg(feature = "alloc")]
 #[inline(always)]
 pub(crate) fn load<V: Side<L>, const L: usize, const N: usize>(
@@ -25,7 +25,7 @@ pub(crate) fn load<V: Side<L>, const L: usize, const N: usize>(
     loaded
 }
 
-/// A matrix for every lane, from registers to memory.
+/// Stores a matrix for every lane from registers to memory.
 #[inline(always)]
 pub(crate) fn store<V: Side<L>, const L: usize, const N: usize>(
     to: &mut [[[f64; L]; N]; N],
@@ -38,8 +38,8 @@ pub(crate) fn store<V: Side<L>, const L: usize, const N: usize>(
     }
 }
 
-/// Factors without exchanging rows: a mass matrix is positive definite, and where it is not the iteration does not converge and the step is
-/// left to another method. The diagonal holds the inverse pivots.
+/// LU factorisation without row exchanges: a mass matrix is positive definite, and where it is not, the iteration does
+/// not converge and the step is left to another method. The diagonal holds the inverse pivots.
 #[inline(always)]
 pub(crate) fn factor<V: Precise, const N: usize>(like: V, matrix: &mut [[V; N]; N]) {
     for column in 0..N {
@@ -55,7 +55,7 @@ pub(crate) fn factor<V: Precise, const N: usize>(like: V, matrix: &mut [[V; N]; 
     }
 }
 
-/// Solves with what [`factor`] has made.
+/// Solves with the factors of [`factor`].
 #[inline(always)]
 pub(crate) fn solve<V: Side<L>, const L: usize, const N: usize>(
     like: V,

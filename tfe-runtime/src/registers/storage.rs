@@ -1,38 +1,40 @@
-//! Where the numbers of an element at its points are kept, and what of its tables no step changes.
+//! Where the values of an element at its points are stored, and the tables that no step changes.
 
 use core::fmt::Debug;
 use core::ops::{Deref, DerefMut};
 
-/// Memory for an element: on the heap, of any size, or in place, of a size that is part of the type.
+/// Memory for an element: on the heap, with any size, or inside the struct, with a size that is part of the type.
 pub trait Storage: Clone + Debug + Sized {
-    /// The number of groups of four points; zero where it is known at run time only.
+    /// The number of groups of four points; zero if it is known only at run time.
     const GROUPS: usize;
 
     /// An entry for each group.
     type Groups<T: Copy + Debug>: List<T>;
-    /// An entry for each group, of equations of first order; empty of others.
+    /// An entry for each group, for equations of first order; empty for others.
     type FirstOrder<T: Copy + Debug>: List<T>;
-    /// An entry for each group, of mass matrices that vary; empty of others.
+    /// An entry for each group, for mass matrices that vary; empty for others.
     type Varying<T: Copy + Debug>: List<T>;
-    /// The lines of a table: an entry for each group of each point.
+    /// The rows of a table: an entry for each group of each point.
     type Lines: List<[f64; 4]>;
-    /// What is needed during a step only, if it is kept between steps.
+    /// The working memory of a step, if it is kept between steps.
     type Kept<T: Clone + Debug>: Keep<T>;
     /// The rows of a constant matrix that is not diagonal.
     type Square<const N: usize>: List<[f64; N]>;
-    /// What elements with more points than unknown rates need besides, of equations of first order; empty of others.
+    /// The additional tables of elements with more points than unknown rates, for equations of first order; empty for
+    /// others.
     type Projected: Deref<Target = [Projection<Self>]> + Clone + Debug;
     /// The tables that no step changes.
     type Fixed: Deref<Target = Fixed<Self>> + Clone + Debug;
 }
 
-/// Elements have up to 16 points at once; beyond, one point after the other.
+/// Up to 16 points are evaluated at once; elements with more evaluate one point after the other.
 pub(crate) const MAX_GROUPS: usize = 4;
 
 /// A number for every coordinate at each of four points.
 pub(crate) type Row<const N: usize> = [[f64; 4]; N];
 
-/// A K × K matrix by columns, the rows in groups of four. Rows beyond the last are copies of it, so that nothing extraordinary happens there.
+/// A K × K matrix by columns, with the rows in groups of four. Rows beyond the last are copies of it, so that no
+/// exceptional values arise there.
 #[derive(Clone, Debug)]
 pub struct Matrix<S: Storage> {
     #[cfg(feature = "alloc")]
@@ -40,52 +42,52 @@ pub struct Matrix<S: Storage> {
     pub(crate) columns: S::Lines,
 }
 
-/// Rates of degree n − 2 at more points than they have coefficients.
+/// The matrices for rates of degree n − 2 at more points than they have coefficients.
 #[derive(Clone, Debug)]
 pub struct Projection<S: Storage> {
-    /// C P: rates to coordinates.
+    /// C P: from rates to coordinates.
     pub(crate) position: Matrix<S>,
     pub(crate) position_low: Matrix<S>,
-    /// E P: numbers at the points to the nearest rates, in the norm of the rule.
+    /// E P: from values at the points to the nearest rates, in the norm of the rule.
     pub(crate) onto_rates: Matrix<S>,
 }
 
-/// A weight for each point and what rounding took from it; zeros beyond the last.
+/// A weight for each point and its rounding error; zeros beyond the last point.
 #[derive(Clone, Debug)]
 pub(crate) struct Weights<S: Storage>(pub(crate) S::Groups<[[f64; 4]; 2]>);
 
-/// What no step changes; `low` is what rounding took.
+/// The tables that no step changes; `low` parts are rounding errors.
 #[derive(Clone, Debug)]
 pub struct Fixed<S: Storage> {
     pub(crate) points: usize,
     pub(crate) groups: usize,
     /// c
     pub(crate) nodes: S::Groups<[f64; 4]>,
-    /// C 1: how far a constant velocity reaches. It is c for collocation methods and primal elements.
+    /// C 1: the displacement for unit velocity. It is c for collocation methods and primal elements.
     pub(crate) reach: S::Groups<[f64; 4]>,
     pub(crate) reach_low: S::Groups<[f64; 4]>,
-    /// E G, which is A for Runge–Kutta methods: rates of momenta to momenta.
+    /// E G, which is A for Runge–Kutta methods: from rates of momenta to momenta.
     pub(crate) once: Matrix<S>,
     pub(crate) once_low: Matrix<S>,
-    /// C G, which is A² for Runge–Kutta methods: what two integrations make of accelerations.
+    /// C G, which is A² for Runge–Kutta methods: the double integral of accelerations.
     pub(crate) twice: Matrix<S>,
     pub(crate) twice_low: Matrix<S>,
     /// b
     pub(crate) weights: Weights<S>,
     /// βᵀG, which is bᵀA for Runge–Kutta methods.
     pub(crate) lever: Weights<S>,
-    /// C P and E P where they are neither A nor one.
+    /// C P and E P, where they are not A and the unit matrix.
     pub(crate) projected: S::Projected,
-    /// From one element to the next that is as long.
+    /// The extrapolation matrix to the next element of the same length.
     pub(crate) continued: Matrix<S>,
 }
 
-/// A list whose length was decided when it was made.
+/// A list whose length is fixed when it is made.
 pub trait List<T>: Deref<Target = [T]> + DerefMut + Clone + Debug {
-    /// As many entries as asked for, or as many as the type has.
+    /// A list with `count` entries, or with as many as the type has.
     fn filled(value: T, count: usize) -> Self;
 
-    /// Takes the numbers of another as long, which may hold any afterwards.
+    /// Takes the values of a list of the same length, whose values are unspecified afterwards.
     #[inline(always)]
     fn take(&mut self, other: &mut Self)
     where
@@ -95,12 +97,12 @@ pub trait List<T>: Deref<Target = [T]> + DerefMut + Clone + Debug {
     }
 }
 
-/// Room for something that may be made anew where it is needed.
+/// Memory that is either kept, or made anew where it is needed.
 pub trait Keep<T>: Clone + Debug {
-    /// Keeps it, or not.
+    /// Keeps the result of `make`, or nothing.
     fn keep(make: impl Fn() -> T) -> Self;
 
-    /// What is kept.
+    /// The kept value.
     fn kept(&mut self) -> Option<&mut T>;
 }
 
@@ -136,7 +138,7 @@ impl<T: Clone + Debug> List<T> for alloc::vec::Vec<T> {
     }
 }
 
-/// What is on the heap is asked for once.
+/// Memory on the heap, which is always kept, so that it is allocated once.
 #[cfg(feature = "alloc")]
 #[derive(Clone, Debug)]
 pub struct Always<T>(T);
@@ -153,7 +155,7 @@ impl<T: Clone + Debug> Keep<T> for Always<T> {
     }
 }
 
-/// Kept if there is room (`KEPT` is one); otherwise it is made anew in each step, and lives in registers if there are enough.
+/// Kept if `KEPT` is one; otherwise it is made anew in each step, and is in registers if there are enough.
 impl<T: Clone + Debug, const KEPT: usize> Keep<T> for Array<T, KEPT> {
     fn keep(make: impl Fn() -> T) -> Self {
         Self(core::array::from_fn(|_| make()))
@@ -165,9 +167,10 @@ impl<T: Clone + Debug, const KEPT: usize> Keep<T> for Array<T, KEPT> {
     }
 }
 
-/// Memory in place, for K points in C groups; `FIRST`, `VARYING` and `SQUARE` are how many of the lists for equations of first order, for mass matrices that vary, and for
-/// one that does not are there: all or none. `KEPT` is one for models so large that making the memory of a step anew takes time, `PROJECTED` for elements with more
-/// points than unknown rates.
+/// Memory inside the struct, for K points in C groups. `FIRST`, `VARYING` and `SQUARE` are the lengths of the lists for
+/// equations of first order, for mass matrices that vary, and for constant ones that are not diagonal: full length or
+/// zero. `KEPT` is one for models so large that it takes time to make the working memory of a step anew, `PROJECTED`
+/// for elements with more points than unknown rates.
 #[derive(Clone, Debug)]
 pub struct Inline<
     const K: usize,

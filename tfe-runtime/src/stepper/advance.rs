@@ -1,4 +1,4 @@
-//! Steps: plain ones, in halves, in arcs between kinks, by the matrix of a linear model.
+//! Steps of a stepper: ordinary ones, in halves, in arcs between kinks, by the matrix of a linear model.
 
 use super::piece::Piece;
 use super::setup::Stepper;
@@ -19,11 +19,12 @@ impl<M, const N: usize> Stepper<'_, M, N>
 where
     M: Model<N>,
 {
-    /// Moves `state` from t to t + h. The first iterate continues the last step if `state` is
-    /// where that ended; a state of one's own is as welcome.
+    /// Moves `state` from t to t + h. The initial guess continues the last step if `state` is where that ended; any
+    /// other state may be given as well.
     ///
-    /// A step whose iteration fails, or does not prove that it found the root that continues the motion (T-115), is cut into halves, and these again, up to 1024
-    /// pieces; [`Statistics::cuts`](crate::Statistics::cuts) counts such steps, and [`dense`](Self::dense) and [`transition`](Self::transition) are those of all pieces together.
+    /// A step whose iteration fails, or does not prove that it has found the root that continues the motion (T-115), is
+    /// cut into halves, and these again, into up to 1024 pieces. [`Statistics::cuts`](crate::Statistics::cuts) counts
+    /// such steps, and [`dense`](Self::dense) and [`transition`](Self::transition) are those of all pieces together.
     ///
     /// # Errors
     /// [`StepError`]; `state` is unchanged then.
@@ -44,7 +45,7 @@ where
         self.advance_plainly(t, h, state, impulses)
     }
 
-    /// A step without a look at kinks.
+    /// A step without a search for kinks.
     pub(super) fn advance_plainly(
         &mut self,
         t: f64,
@@ -56,7 +57,7 @@ where
             return Ok(());
         };
         if !may_be_cut(&error, M::FACTS.linear, self.control.solve) {
-            // What is in the workspace may not be of the step before.
+            // The workspace may not hold the previous step.
             self.carried.memory.last = None;
             return Err(error);
         }
@@ -77,14 +78,15 @@ where
         Ok(())
     }
 
-    /// Whether kernels choose by the sign of anything; where they do not nobody asks again. A start without a velocity tells nothing: the step says why.
+    /// Whether kernels have branches that depend on a sign; if they have none, this is not evaluated again. At a start
+    /// without velocity the answer is unknown: the step reports the reason.
     fn has_kinks(&mut self, t: f64, state: &State<N>) -> bool {
         let mut switches = Vec::new();
         if !self.switches(t, state, &mut switches) {
             return false;
         }
         self.at_kinks = !switches.is_empty();
-        // The inside of every step is looked at.
+        // Dense output is needed for every step.
         self.carried.ends_only &= !self.at_kinks;
         self.at_kinks
     }
@@ -112,14 +114,14 @@ where
         outcome
     }
 
-    /// Whether a matrix is asked for.
+    /// Whether a propagator is to be used.
     fn is_propagated(&self) -> bool {
         self.carried.ends_only && !matches!(self.control.solve, Solve::FixedPoint)
     }
 
-    /// Moves `state` by the matrix of a linear model; false where an ordinary step is to be done.
+    /// Moves `state` by the propagator of a linear model; false where an ordinary step is to be made.
     ///
-    /// The matrix costs 2N + 1 steps: it is made after as many of the same length.
+    /// The propagator costs 2N + 1 steps: it is made after as many of the same length.
     fn propagate(&mut self, t: f64, h: f64, state: &mut State<N>) -> bool {
         self.carried.alike = if self.carried.alike.0 == h {
             (h, self.carried.alike.1.saturating_add(1))
@@ -150,7 +152,7 @@ where
         };
         let start_low = low;
         if !propagator.advance(state, &mut low) {
-            // The ordinary step says why.
+            // The ordinary step reports the reason.
             return false;
         }
         self.carried.memory.last = Some(Last {
@@ -167,7 +169,7 @@ where
         true
     }
 
-    /// Moves `state` with all points of the element at once.
+    /// Moves `state` by the iteration with all points of the element at once.
     fn together(&mut self, t: f64, h: f64, state: &mut State<N>) -> Together {
         let Some(points) = &mut self.carried.points else {
             return Together::LeftToOthers;
@@ -181,7 +183,7 @@ where
                 self.carried.skipped = false;
             }
             Together::LeftToOthers => {
-                // An ordinary step continues what is in its workspace.
+                // An ordinary step continues from what is in its workspace.
                 if self.carried.skipped && !self.write_back() {
                     self.carried.memory.last = None;
                 }
@@ -192,14 +194,14 @@ where
         outcome
     }
 
-    /// Says that the next step with all points at once continues nothing.
+    /// Makes the next step with all points at once start without continuing the last one.
     fn forget_points(&mut self) {
         if let Some(points) = &mut self.carried.points {
             points.forget();
         }
     }
 
-    /// Rates and forces of the last step to where an ordinary step has them; false if there is none.
+    /// Copies rates and forces of the last step to where an ordinary step expects them; false if there is no last step.
     pub(super) fn write_back(&mut self) -> bool {
         if !Self::MAY_HAVE_POINTS {
             return false;
@@ -209,7 +211,7 @@ where
         points.is_some_and(|points| points.write_back::<M>(&self.table, &mut self.carried.numbers))
     }
 
-    /// By how much an ordinary step moves a state, rounding included.
+    /// The increment of a state by an ordinary step, with its rounding error.
     fn increment(&self, h: f64, start: &State<N>) -> Result<State<N>, StepError> {
         let mut memory = Memory::new();
         let mut end = *start;
@@ -222,7 +224,7 @@ where
         Ok(end)
     }
 
-    /// A step of a linear model, whose iteration nothing can mislead.
+    /// A step of a linear model, whose equations have a single root.
     pub(super) fn ordinary(
         &self,
         memory: &mut Memory<N>,
@@ -283,7 +285,7 @@ where
             }
         }
         if Self::MAY_HAVE_POINTS && !impulses.is_empty() {
-            // It continues what is in the workspace, as a step that all points at once have left.
+            // It continues from the workspace, which a step with all points at once has not filled.
             self.look_inside();
         }
         self.carried.skipped = false;

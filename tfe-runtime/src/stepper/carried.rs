@@ -1,4 +1,4 @@
-//! What a stepper carries from step to step.
+//! What a stepper carries from step to step, without its model.
 
 use super::piece::{Ahead, Piece};
 use crate::dense::DenseElement;
@@ -8,33 +8,33 @@ use crate::propagator::Propagator;
 use crate::registers::storage::Heap;
 use alloc::vec::Vec;
 
-/// The same whichever model it steps.
+/// The same for whichever model is stepped.
 #[derive(Clone, Debug)]
 pub(super) struct Carried<const N: usize> {
     pub(super) memory: Memory<N>,
     pub(super) numbers: Vec<f64>,
     pub(super) pivots: Vec<usize>,
     pub(super) impulses: Vec<Impulse<N>>,
-    /// Nobody asks for the inside of every element.
+    /// Whether dense output is not requested for every step.
     pub(super) ends_only: bool,
-    /// Of a linear model, once it has paid.
+    /// For a linear model, once it has paid to make it.
     pub(super) propagator: Option<Propagator<N>>,
-    /// All points at once, where model and element allow it.
+    /// The iteration with all points at once, where model and element allow it.
     pub(super) points: Option<Points<N, Heap>>,
-    /// Steps of one length so far.
+    /// The length of the last steps, and their number.
     pub(super) alike: (f64, usize),
-    /// The workspace does not hold the last step.
+    /// Whether the workspace does not hold the last step.
     pub(super) skipped: bool,
-    /// Of a last step that was cut.
+    /// The pieces of the last step, if it was cut.
     pub(super) pieces: Vec<Piece<N>>,
-    /// Where the last element has ended, if that was behind the node.
+    /// Where the last element ended, if that was beyond the node.
     pub(super) ahead: Option<Ahead<N>>,
-    /// An element of the last step went over one of its nodes.
+    /// Whether an element of the last step passed over one of its nodes.
     pub(super) passes_node: bool,
 }
 
 impl<const N: usize> Carried<N> {
-    /// Nothing yet.
+    /// Before the first step.
     pub(super) fn at_rest(points: Option<Points<N, Heap>>) -> Self {
         Self {
             memory: Memory::new(),

@@ -1,4 +1,4 @@
-//! The inside of the last step.
+//! Dense output of the last step.
 
 use super::setup::Stepper;
 use crate::dense::DenseElement;
@@ -14,12 +14,13 @@ impl<M, const N: usize> Stepper<'_, M, N>
 where
     M: Model<N>,
 {
-    /// The workspace of the last step, where it was gone past; nothing where the stepper's own one is that.
+    /// The workspace of the last step, if that step did not fill the stepper's own one; `None` if it did.
     ///
-    /// Steps with all points at once keep the root that they have found, and no other one is looked for. A step by the matrix of a linear model is solved, which has one root.
+    /// After a step with all points at once its root is copied, and no other root is searched for. A step by the
+    /// propagator of a linear model is solved again; its equations have a single root.
     ///
     /// # Errors
-    /// [`StepError`] where the step of a linear model cannot be solved.
+    /// [`StepError`] if the step of a linear model cannot be solved.
     pub(super) fn retrace(&self) -> Result<Option<Vec<f64>>, StepError> {
         if !(Self::MAY_HAVE_POINTS || Self::MAY_BE_PROPAGATED) {
             return Ok(None);
@@ -44,8 +45,9 @@ where
         Ok(Some(numbers))
     }
 
-    /// A box that the polynomial of the last step does not leave, for much less than that polynomial takes; none where it is not to be had for so little: of steps that were cut or not made by
-    /// fixed-point iteration, of linear and of constrained models, and of elements that are no Runge–Kutta methods.
+    /// A box that contains the polynomial of the last step, at much less cost than that polynomial. It is `None` for
+    /// steps that were cut or not made by fixed-point iteration, for linear and constrained models, and for elements
+    /// that are not Runge–Kutta methods.
     #[must_use]
     #[inline(always)]
     pub fn reach(&mut self) -> Option<Reach<N>> {
@@ -68,7 +70,7 @@ where
         self.weights = Some(Weights::of(&self.table.view()));
     }
 
-    /// Makes the inside of the last step ready to be looked at, where [`ends_only`](Self::ends_only) has left it out.
+    /// Prepares dense output of the last step, where [`ends_only`](Self::ends_only) has omitted it.
     pub fn look_inside(&mut self) {
         if self.carried.skipped && self.write_back() {
             self.carried.skipped = false;
@@ -77,14 +79,14 @@ where
 
     /// The polynomial of the last step, from time `start` to time `end`.
     ///
-    /// Before the first step, and after a failed one, it is the constant zero. Where the inside of a step by the matrix of a linear model is not found again, it is NaN between
-    /// the ends.
+    /// Before the first step, and after a failed one, it is the constant zero. If the inside of a step by the
+    /// propagator of a linear model cannot be recomputed, it is NaN between the ends.
     #[must_use]
     pub fn dense(&self, start: f64, end: f64) -> DenseElement<N> {
         self.dense_in(None, start, end)
     }
 
-    /// The same in the memory of one that is not needed any more.
+    /// The same, reusing the memory of an element that is no longer needed.
     #[must_use]
     pub fn dense_in(
         &self,
@@ -126,7 +128,7 @@ where
             let momenta = &numbers[3 * m + points..3 * m + 2 * points];
             let rates = &numbers[..scheme.unknowns() * N];
             let (rates, momenta) = (rates.as_chunks().0, momenta.as_chunks().0);
-            // Of impulses at the ends constraints take up a part, which is spread as what they do there.
+            // Constraints take up a part of impulses at the ends, which is distributed like their own impulses there.
             let (mut start, mut end) = (last.start, last.end);
             for impulse in interval.impulses {
                 let tau = interval.node_or_place(impulse);

@@ -1,4 +1,4 @@
-//! Derivatives of the last step by its start and by parameters, forwards and backwards.
+//! Derivatives of the last step by its start and by parameters, in forward and in adjoint mode.
 
 use super::setup::Stepper;
 use crate::backwards::are_parameters;
@@ -12,7 +12,8 @@ use crate::workspace::{Workspace, linearised_len};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Rows of derivatives by the start of a piece and by directions, after those of the pieces before, all with the columns of the whole step.
+/// The chain rule: multiplies rows of derivatives, by the start of a piece and by directions, by those of the pieces
+/// before. All have the columns of the whole step.
 fn chain(columns: usize, (rows, before): (&[f64], &[f64]), chained: &mut [f64]) {
     let width = before.len() / columns;
     let rows = rows.chunks_exact(columns);
@@ -25,7 +26,7 @@ fn chain(columns: usize, (rows, before): (&[f64], &[f64]), chained: &mut [f64]) 
     }
 }
 
-/// Adds what a loss of the inside has of the start directly.
+/// Adds the direct derivatives by the start of a loss that depends on the inside.
 fn add_start(inside: Option<&InsideLoss>, lambda: &mut [f64]) {
     if let Some(InsideLoss { start, .. }) = inside {
         add_multiple(lambda, 1.0, start);
@@ -47,7 +48,7 @@ where
 
     /// Writes the derivative of the end of the last step by its start and by g directions, 2N × (2N + g), row by row, the first columns and all rows ordered (p, q).
     ///
-    /// Impulses stay at their times, and the crossings of kinks at which the step was cut at theirs.
+    /// Impulses stay at their times, and so do the crossings of kinks at which the step was cut.
     ///
     /// # Errors
     /// As [`transition`](Self::transition).
@@ -59,7 +60,8 @@ where
         self.linearise_all(directions, matrix, None)
     }
 
-    /// The same, and the derivatives of the polynomial of the step, or of each of its [pieces](crate::step::DenseElement::pieces), with the same columns.
+    /// The same, with the derivatives of the polynomial of the step, or of each of its
+    /// [pieces](crate::step::DenseElement::pieces), with the same columns.
     ///
     /// # Errors
     /// As [`transition`](Self::transition).
@@ -80,7 +82,7 @@ where
         mut inside: Option<&mut Vec<InsideSlopes>>,
     ) -> Result<(), TransitionError> {
         if self.carried.passes_node {
-            // Where constraints lose rank the tangents of the motion are open.
+            // Where the rank of the constraints changes, the tangent of the motion is undetermined.
             return Err(StepError::from(ConstraintError::RankChanged).into());
         }
         if self.carried.pieces.is_empty() && inside.is_none() {
@@ -98,7 +100,7 @@ where
             product[row * columns + row] = 1.0;
         }
         let (mut factor, mut next) = (vec![0.0; needed], vec![0.0; needed]);
-        // The last one leaves the stepper as the step has left it.
+        // The last piece leaves the stepper as the step has left it.
         for piece in 0..self.carried.pieces.len().max(1) {
             let mut own = directions.to_vec();
             if !self.carried.pieces.is_empty() {
@@ -129,8 +131,10 @@ where
         Ok(())
     }
 
-    /// Multiplies the matrix of [`linearise`](Self::linearise) with `lambda`, 2N numbers ordered (p, q), from the left: its columns of the start take the place of `lambda`,
-    /// those of the directions are added to `by_direction`. Without constraints the cost does not grow with the number of directions but for their explicit derivatives.
+    /// Multiplies the matrix of [`linearise`](Self::linearise) by the row `lambda`, 2N numbers ordered (p, q), from the
+    /// left: the result for the columns of the start replaces `lambda`, that for the directions is added to
+    /// `by_direction`. Without constraints the cost does not grow with the number of directions, except for their
+    /// explicit derivatives.
     ///
     /// # Errors
     /// As [`transition`](Self::transition).
@@ -143,10 +147,11 @@ where
         self.adjoint_inside(directions, &[], lambda, by_direction)
     }
 
-    /// The same with a loss of the inside of the step: its derivatives by the polynomial, or by that of each of its [pieces](crate::step::DenseElement::pieces); nothing where it has nothing of them.
+    /// The same for a loss that depends on the inside of the step: `inside` has its derivatives by the polynomial, or
+    /// by that of each of its [pieces](crate::step::DenseElement::pieces); empty if it does not depend on them.
     ///
     /// # Errors
-    /// As [`transition`](Self::transition); [`TransitionError::Shape`] where there are not as many as pieces.
+    /// As [`transition`](Self::transition); [`TransitionError::Shape`] if their number differs from that of the pieces.
     pub fn adjoint_inside(
         &mut self,
         directions: &[Direction],
@@ -169,12 +174,12 @@ where
             self.recall(piece);
             self.adjoint_of_last(&own, inside.get(piece), lambda, by_direction)?;
         }
-        // The stepper is where the step has left it.
+        // Returns the stepper to where the step has left it.
         self.recall(self.carried.pieces.len() - 1);
         Ok(())
     }
 
-    /// The directions of a piece of the last step, as parts of those of the whole.
+    /// The directions of a piece of the last step, as fractions of those of the whole step.
     fn of_piece(&self, directions: &[Direction], piece: usize) -> Vec<Direction> {
         let begin = self.carried.pieces[0].last.t;
         let length: f64 = self.carried.pieces.iter().map(|piece| piece.last.h).sum();
@@ -187,7 +192,7 @@ where
         directions.iter().map(own).collect()
     }
 
-    /// Goes back to where a piece of the last step has ended.
+    /// Restores the stepper to the end of a piece of the last step.
     fn recall(&mut self, piece: usize) {
         let piece = &self.carried.pieces[piece];
         self.carried.memory.last = Some(piece.last);

@@ -1,4 +1,4 @@
-//! Steps over nodes at which constraints lose rank (T-120): the element next to such a node ends behind it.
+//! Steps over nodes at which constraints lose rank (T-120): the element at such a node ends beyond it.
 
 use super::piece::{Ahead, Piece};
 use super::setup::Stepper;
@@ -12,23 +12,25 @@ use crate::newton::Solve;
 use crate::scheme::Tables;
 use alloc::vec::Vec;
 
-/// How far before the node the element over it begins, in parts of the step: one is tried after the other. Farther away less is lost to rounding, nearer the polynomial is
-/// better at the node.
+/// How far before the node the element over it begins, as fractions of the step; they are tried one after the other.
+/// Farther away less is lost to rounding, nearer the polynomial is more accurate at the node.
 const REACHES: [f64; 5] = [1.0 / 64.0, 1.0 / 16.0, 1.0 / 256.0, 1.0 / 4.0, 1.0 / 1024.0];
 
-/// How far behind the node it ends, in parts of that: no point of the element is to lie on the node.
+/// How far beyond the node it ends, as a fraction of that distance: no point of the element may lie on the node.
 const BEHIND: f64 = 0.75;
 
-/// Where the independent part of a constraint's row is smaller, positions and velocities lose digits: those of a rounding over it.
+/// If the independent part of a constraint's row is smaller than this, positions and velocities lose digits: their
+/// error is that of a rounding divided by this part.
 const LOST: f64 = 1e-4;
 
-/// That is so at the end of a step and not of the model, if it is so much smaller than at the start.
+/// This is attributed to the end of a step, and not to the model, if the part is smaller by this factor than at the
+/// start.
 const LOST_HERE: f64 = 0.125;
 
-/// A row that has become so much shorter is about to vanish.
+/// A row whose length has shrunk by this factor is about to vanish.
 const VANISHING: f64 = 1e-2;
 
-/// Whether much of the constraints' independence is lost from the start of a step to its end.
+/// Whether the constraints lose much of their independence from the start of a step to its end.
 fn is_lost(start: &Independence, end: &Independence) -> bool {
     end.rank < start.rank
         || end.least < LOST.min(LOST_HERE * start.least)
@@ -97,7 +99,7 @@ where
         }
     }
 
-    /// Whether the constraints are much less independent where the last step has ended than where it began.
+    /// Whether the constraints are much less independent at the end of the last step than at its start.
     fn loses_rank(&self) -> bool {
         let start = (self.carried.pieces.first())
             .map_or(self.carried.memory.independence, |one| one.independence);
@@ -130,8 +132,8 @@ where
         Ok(())
     }
 
-    /// Moves `state` to a node near which the constraints lose rank: by an element that ends behind it, whose polynomial has the state at the node. False, with nothing
-    /// changed, where that fails.
+    /// Moves `state` to a node near which the constraints lose rank, by an element that ends beyond it and whose
+    /// polynomial gives the state at the node. False, with nothing changed, if that fails.
     #[cold]
     fn over(&mut self, (t, h): (f64, f64), state: &mut State<N>) -> bool {
         let (start, steps) = (*state, self.carried.memory.statistics.steps);

@@ -1,4 +1,4 @@
-//! Parts of a step, and what is done behind its end.
+//! Pieces of steps that were cut, and elements that end beyond their node.
 
 use crate::constrained::rows::Independence;
 use crate::dense::DenseElement;
@@ -6,7 +6,7 @@ use crate::method::{Impulse, Last};
 use crate::model::State;
 use alloc::vec::Vec;
 
-/// A part of a step that was cut.
+/// A piece of a step that was cut.
 #[derive(Clone, Debug)]
 pub(super) struct Piece<const N: usize> {
     pub(super) last: Last<N>,
@@ -18,18 +18,18 @@ pub(super) struct Piece<const N: usize> {
     pub(super) pivots: Vec<usize>,
 }
 
-/// Where the motion has got behind the last node.
+/// Where an element ended beyond the last node.
 #[derive(Clone, Debug)]
 pub(super) struct Ahead<const N: usize> {
     pub(super) node: State<N>,
     pub(super) t: f64,
     pub(super) state: State<N>,
-    /// From the node to there.
+    /// The piece from the node to there.
     pub(super) piece: Piece<N>,
 }
 
 impl<const N: usize> Ahead<N> {
-    /// Whether a step begins at the node and ends behind what was done.
+    /// Whether a step begins at the node and ends beyond that element.
     pub(super) fn serves(&self, t: f64, h: f64, state: &State<N>) -> bool {
         let done = (self.t - t) / h;
         self.node.is_same(state) && done > 0.0 && done < 1.0

@@ -1,4 +1,4 @@
-//! A stepper and its memory.
+//! The stepper that owns its memory, and its options.
 
 use super::carried::Carried;
 use crate::backwards::Backwards;
@@ -67,23 +67,23 @@ pub struct Stepper<'m, M, const N: usize> {
     pub(super) table: SchemeTable,
     pub(super) control: Control,
     pub(super) carried: Carried<N>,
-    /// What the numbers at points weigh for the reach of a step, once that was asked for.
+    /// The weights for the reach of a step, computed on first use.
     pub(super) weights: Option<Weights>,
-    /// The last step was made with all points at once.
+    /// Whether the last step was made with all points at once.
     pub(super) is_of_points: bool,
-    /// Steps are cut at kinks, if there are any.
+    /// Whether steps are cut at kinks, if there are any.
     pub(super) at_kinks: bool,
-    /// What was asked for; what is in use may trust more.
+    /// The requested kind of iteration; the one in use may accept more roots.
     pub(super) solve: Solve,
-    /// Of a run of the same motion, where the iteration of the next step may start.
+    /// The initial guess of the next step from another run of the same motion.
     pub(super) foreseen: Foreseen,
-    /// What derivatives of the last step need, besides its workspace.
+    /// The memory that derivatives of the last step need in addition to its workspace.
     pub(super) extra: Vec<f64>,
-    /// What elements backwards need, if there were any.
+    /// The memory of the adjoint of elements, once it has been used.
     pub(super) backwards: Option<Box<Backwards<N>>>,
 }
 
-// Not derived: the model is borrowed, it need not be `Clone`.
+// Not derived: the model is borrowed and need not be `Clone`.
 impl<M, const N: usize> Clone for Stepper<'_, M, N> {
     fn clone(&self) -> Self {
         Self {
@@ -106,26 +106,26 @@ impl<'m, M, const N: usize> Stepper<'m, M, N>
 where
     M: Model<N>,
 {
-    /// Constants, so that nothing is compiled for models that have none.
+    /// This and the next constants avoid compiling code that a model never uses.
     pub(super) const MAY_HAVE_KINKS: bool = !M::FACTS.smooth;
     pub(super) const HAS_CONSTRAINTS: bool = !M::CONSTRAINTS.is_empty();
 
-    /// Likewise, for models that never step like this.
+    /// Whether steps with all points at once are possible.
     pub(super) const MAY_HAVE_POINTS: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
 
-    /// Likewise a constant: whether all steps of one length have the same matrix.
+    /// Whether all steps of one length have the same matrix.
     pub(super) const MAY_BE_PROPAGATED: bool =
         M::FACTS.linear && !M::FACTS.time_dependent && M::CONSTRAINTS.is_empty();
 
-    /// A stepper at rest.
+    /// A stepper that has made no step.
     ///
     /// # Errors
-    /// [`ElementError`] if the element is none.
+    /// [`ElementError`] if the element is invalid.
     pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
         Self::sharing(Share::Borrowed(model), element, control)
     }
 
-    /// The same of a model that may belong to the stepper.
+    /// The same for a model that may be owned by the stepper.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -161,7 +161,8 @@ where
         Ok(stepper)
     }
 
-    /// Memory for the tangent of an element, if there is none yet: megabytes for thirty coordinates, and no use while a fixed point contracts.
+    /// Allocates the tangent of an element on first use: it takes megabytes for thirty coordinates, and is not needed
+    /// while the fixed-point iteration contracts.
     pub(super) fn make_room(&mut self) {
         if self.carried.numbers.is_empty() {
             (self.carried.numbers, self.carried.pivots) = self.room();
@@ -175,10 +176,10 @@ where
         (vec![0.0; numbers], vec![0; pivots])
     }
 
-    /// Goes on with another model, of which nothing is known yet; what the steps so far have cost stays counted.
+    /// Continues with another model, about which nothing is known yet; the counts are kept.
     ///
     /// # Errors
-    /// None that [`new`](Self::new) did not have.
+    /// Only those of [`new`](Self::new).
     pub fn set_model(&mut self, model: Share<'m, M>) -> Result<(), ElementError> {
         let control = Control {
             solve: self.solve,
@@ -191,23 +192,25 @@ where
         Ok(())
     }
 
-    /// Changes what iterations may leave from the next step on: [`Control::tolerance`].
+    /// Changes the tolerance of the iterations from the next step on: [`Control::tolerance`].
     pub fn set_tolerance(&mut self, tolerance: f64) {
         self.control.tolerance = tolerance;
     }
 
-    /// Says that [`dense`](Self::dense) and [`transition`](Self::transition) will be asked for now and then only.
+    /// Declares that [`dense`](Self::dense) and [`transition`](Self::transition) will be called only now and then.
     ///
-    /// Linear models with constant coefficients then step by a matrix, y₁ = y₀ + D y₀ + c, made after 2N + 1 steps of one length: a product of a
-    /// 2N × 2N matrix and a vector a step. Afterwards the inside of an element costs a step of its own.
+    /// Linear models with constant coefficients are then stepped by a matrix, y₁ = y₀ + D y₀ + c, made after 2N + 1
+    /// steps of one length, so that a step is a product of a 2N × 2N matrix and a vector. Dense output of an element
+    /// then costs a step of its own.
     #[must_use]
     pub fn ends_only(mut self) -> Self {
         self.carried.ends_only = true;
         self
     }
 
-    /// Cuts steps where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the arguments of a `min` or `max` changes its sign, so that
-    /// elements keep their order (T-119); [`Statistics::kinks`] counts the crossings. Models without such functions step as before.
+    /// Cuts steps where the argument of an `abs` or `sign`, the condition of a `select`, or the difference of the
+    /// arguments of a `min` or `max` changes its sign, so that elements keep their order (T-119); [`Statistics::kinks`]
+    /// counts the crossings. Models without such functions are stepped as before.
     #[must_use]
     pub fn at_kinks(self) -> Self {
         Self {
@@ -222,7 +225,7 @@ where
         self.table.element()
     }
 
-    /// How it solves elements.
+    /// The control of its iterations.
     #[must_use]
     pub fn control(&self) -> Control {
         Control {
@@ -237,13 +240,13 @@ where
         &self.model
     }
 
-    /// What the steps so far have cost.
+    /// The cost of all steps so far.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
         &self.carried.memory.statistics
     }
 
-    /// The same since the last call.
+    /// The counts since the last call.
     pub fn take_statistics(&mut self) -> Statistics {
         core::mem::take(&mut self.carried.memory.statistics)
     }

@@ -1,4 +1,4 @@
-//! What a stepper leaves behind without its model.
+//! A suspended stepper: its memory without the model.
 
 use super::carried::Carried;
 use super::setup::Stepper;
@@ -11,19 +11,21 @@ use crate::share::Share;
 use crate::statistics::Statistics;
 use alloc::vec::Vec;
 
-/// All that a stepper carries from step to step, without its model: with it the next step is the same to the last bit.
+/// Everything that a stepper carries from step to step, without its model: after [`Stepper::resume`] the next step is
+/// the same to the last bit.
 #[derive(Clone, Debug)]
 pub struct Suspended<const N: usize> {
     element: Element,
-    /// Time and state of the last end.
+    /// Time and state at the end of the last step.
     place: (f64, State<N>),
-    /// What tells the model from others.
+    /// The bits by which the model is recognised.
     tokens: Vec<u64>,
     carried: Carried<N>,
 }
 
-/// What tells a model from others of its type: its parameters, and what it has beside them, to the bit. Where there are none, as of kernels written by hand, its derivatives at a place: of a linear model
-/// they say all.
+/// The bits that distinguish a model from others of its type: its parameters, and what its kernels read besides. If
+/// there are none, as for kernels written by hand, these are the bits of its derivatives at one place, which for a
+/// linear model determine it.
 fn tokens<M, const N: usize>(model: &M, (t, place): &(f64, State<N>)) -> Vec<u64>
 where
     M: Model<N>,
@@ -31,7 +33,7 @@ where
     let bits = |index| model.parameter(index).to_bits();
     let mut all: Vec<u64> = (0..model.parameters()).map(bits).collect();
     model.unnumbered(&mut |value| all.push(value));
-    // Functions given for inputs, which models of this kind may have, are not called again.
+    // Input functions, which models of this kind may have, are not called again.
     if !all.is_empty() || M::FACTS.time_dependent {
         return all;
     }
@@ -47,7 +49,7 @@ where
     let matrices = [zz, zq, qq, force_z, force_q].into_iter().flatten();
     let rows = [&first.z, &first.q, &first.force].into_iter();
     let numbers = rows.chain(matrices).flatten();
-    // One NaN is as good as another.
+    // All NaNs count as equal.
     let bits = |number: &f64| match number.is_nan() {
         true => f64::NAN.to_bits(),
         false => number.to_bits(),
@@ -62,7 +64,8 @@ impl<const N: usize> Suspended<N> {
         self.element
     }
 
-    /// Whether the stepper had this model: one of the same parameters, or, where none are numbered, of the same derivatives where it ended.
+    /// Whether the stepper had this model: one with the same parameters or, where none are numbered, with the same
+    /// derivatives at the place where it ended.
     #[must_use]
     pub fn is_of<M: Model<N>>(&self, model: &M) -> bool {
         self.tokens == tokens(model, &self.place)
@@ -73,7 +76,7 @@ impl<'m, M, const N: usize> Stepper<'m, M, N>
 where
     M: Model<N>,
 {
-    /// Leaves the model.
+    /// Drops the model and keeps everything else.
     #[must_use]
     pub fn suspend(self) -> Suspended<N> {
         let last = self.carried.memory.last;
@@ -86,7 +89,8 @@ where
         }
     }
 
-    /// A stepper that goes on where another one was [suspended](Self::suspend), with nothing counted yet; one at rest where that [had](Suspended::is_of) another model.
+    /// A stepper that continues where another one was [suspended](Self::suspend), with all counts zero. If that
+    /// [had](Suspended::is_of) another model, the stepper starts anew.
     ///
     /// # Errors
     /// As [`new`](Self::new).

@@ -1,4 +1,4 @@
-//! Steps that leave to another run, or take from one, where iterations may start.
+//! Exchange of initial guesses between runs of the same motion.
 
 use super::setup::Stepper;
 use crate::constrained::Trail;
@@ -11,7 +11,8 @@ impl<M, const N: usize> Stepper<'_, M, N>
 where
     M: Model<N>,
 {
-    /// Adds the last step to a trail, for models with constraints and elements of Gauss points; a step that was cut is left out.
+    /// Adds the last step to a trail, for models with constraints and elements with Gauss points; a step that was cut
+    /// is left out.
     pub fn leave(&self, trail: &mut Trail) {
         if !Self::HAS_CONSTRAINTS {
             return;
@@ -25,7 +26,8 @@ where
         }
     }
 
-    /// Has the iteration of the step from t to t + h start from what another run has found there, if a trail reaches that far and the last step is continued.
+    /// Uses the solution of another run as initial guess of the step from t to t + h, if its trail reaches that far and
+    /// the last step is continued.
     pub fn foresee(&mut self, trail: &Trail, (t, h): (f64, f64)) {
         if Self::HAS_CONSTRAINTS && self.may_foresee() {
             let scheme = self.table.view();

@@ -1,4 +1,5 @@
-//! What is made of the linear system of an element; what nobody wants of a model is not compiled for it.
+//! The results that can be computed from the linear system of an element, each as a type, so that results that are not
+//! requested are not compiled.
 
 #[cfg(feature = "alloc")]
 use crate::backwards::Backwards;
@@ -16,9 +17,9 @@ use crate::velocity_form::VelocityForm;
 #[cfg(feature = "alloc")]
 use alloc::{vec, vec::Vec};
 
-/// Is made of the system of an element, whichever form that has.
+/// A result computed from the system of an element, in each of its forms.
 pub(super) trait Wanted<const N: usize>: Sized {
-    /// Of an element with constraints, whose system is not set up yet.
+    /// For an element with constraints, whose system is not set up yet.
     fn of_constrained<M: Model<N>>(
         self,
         form: &mut ConstrainedForm<'_, M, N>,
@@ -27,7 +28,7 @@ pub(super) trait Wanted<const N: usize>: Sized {
         system: System<'_>,
     ) -> Result<(), StepError>;
 
-    /// In phase space.
+    /// For an element in phase space.
     fn of_phase<M: Model<N>>(
         self,
         equations: &PhaseForm<'_, M, N>,
@@ -36,7 +37,7 @@ pub(super) trait Wanted<const N: usize>: Sized {
         system: System<'_>,
     ) -> Result<(), StepError>;
 
-    /// Of velocities; `forces` are those at the end.
+    /// For an element in velocity form; `forces` are the derivatives of the momentum at the end.
     fn of_velocities<M: Model<N>>(
         self,
         equations: &mut VelocityForm<'_, M, N>,
@@ -45,7 +46,7 @@ pub(super) trait Wanted<const N: usize>: Sized {
         system: System<'_>,
     ) -> Result<(), StepError>;
 
-    /// Whether it can be had without the system.
+    /// Whether the result could be computed by iteration, without the system.
     fn by_iteration<M: Model<N>>(
         &mut self,
         _equations: &mut VelocityForm<'_, M, N>,
@@ -55,7 +56,7 @@ pub(super) trait Wanted<const N: usize>: Sized {
     }
 }
 
-/// The derivatives of the end, row by row, with the columns of the sides.
+/// The derivatives of the end, row by row, with the columns of the right-hand sides.
 pub(super) struct Matrix<'a> {
     pub(super) ends: &'a mut [f64],
 }
@@ -123,7 +124,7 @@ impl<const N: usize> Wanted<N> for Matrix<'_> {
     }
 }
 
-/// The same, and the derivatives of the polynomials of the element.
+/// The same, with the derivatives of the polynomials of the element.
 #[cfg(feature = "alloc")]
 pub(super) struct MatrixInside<'a> {
     pub(super) ends: &'a mut [f64],
@@ -189,15 +190,16 @@ impl<const N: usize> Wanted<N> for MatrixInside<'_> {
     }
 }
 
-/// Their product with λ, from the left: that with the columns of the start takes the place of λ, those of the directions are added to others.
+/// The product of a row λ with these derivatives: that for the columns of the start replaces λ, those for the
+/// directions are added to sums.
 pub(super) struct Product<'a, const N: usize> {
     /// λ
     pub(super) lambda: &'a mut [f64],
     pub(super) by_direction: &'a mut [f64],
-    /// For all parameters at once, which are no directions then.
+    /// Derivatives by all parameters at once, which are not directions then.
     #[cfg(feature = "alloc")]
     pub(super) at_once: Option<&'a mut Backwards<N>>,
-    /// What else is asked for: a loss of the inside of the element.
+    /// The derivatives of a loss by the inside of the element, if it depends on that.
     #[cfg(feature = "alloc")]
     pub(super) inside: Option<&'a InsideLoss>,
 }
@@ -252,7 +254,7 @@ impl<const N: usize> Wanted<N> for Product<'_, N> {
         _: &[Direction],
         _: System<'_>,
     ) -> Result<(), StepError> {
-        // Gradients are asked for where there is an allocator.
+        // Gradients are only computed where there is an allocator.
         Err(StepError::NonFinite)
     }
 

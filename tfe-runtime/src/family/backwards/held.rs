@@ -1,4 +1,4 @@
-//! What constraints have of parameters, backwards (T-160).
+//! The adjoint of constraints: derivatives by their parameters (T-160).
 
 use super::Backwards;
 use super::written::{Points, add_of_points, add_of_rows};
@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 impl<M: Model> Backwards<'_, M> {
-    /// Adds what constraints of an element have of parameters.
+    /// Adds the derivatives by parameters of the constraints of an element.
     pub(super) fn take_derivatives_of_constraints(
         &mut self,
         (start, end): (f64, f64),
@@ -50,7 +50,7 @@ impl<M: Model> Backwards<'_, M> {
         self.take_derivatives_of_node(end, &weights.end);
     }
 
-    /// The same at a node.
+    /// The same for the constraints at a node.
     pub(super) fn take_derivatives_of_node(&mut self, t: f64, weights: &NodeWeights) {
         let model = self.view.model();
         let fours = |values: &[f64]| -> Vec<Points> {

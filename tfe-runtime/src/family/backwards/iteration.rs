@@ -1,4 +1,5 @@
-//! The transposed equations of an element M q̈ = f, iterated as the element itself is (T-150).
+//! The adjoint equations of an element M q̈ = f, solved by the same kind of fixed-point iteration as the element itself
+//! (T-150).
 
 use super::written::Points;
 use crate::backwards::{Judge, Units, largest_of_unlike, units};
@@ -14,25 +15,26 @@ use core::ops::Range;
 
 const ZERO: Points = Lanes([0.0; 4]);
 
-/// Numbers at all points of an element, four to a group: a row of n for each group. Numbers beyond the last point are zeros.
+/// The numbers at all points of an element, in groups of four points: a row of n for each group. Numbers beyond the
+/// last point are zero.
 #[derive(Clone, Debug)]
 pub(super) struct Iteration {
-    /// b_l and β_j, one a group.
+    /// b_l and β_j, one entry for each group.
     weights: Vec<Points>,
     advance: Vec<Points>,
-    /// G_il and C_lj, for each i (l) as many as groups.
+    /// G_il and C_lj, for each i (or l) one entry for each group.
     force: Vec<Points>,
     position: Vec<Points>,
     points: usize,
     inverse_mass: Vec<f64>,
-    /// None where masses are alike.
+    /// `None` where the masses are of similar size.
     units: Option<Vec<Units>>,
-    /// Places of second derivatives by coordinates, of forces by velocities, and of forces by coordinates.
+    /// The places of second derivatives by coordinates, of forces by velocities, and of forces by coordinates.
     parts: [Part; 3],
     /// Second derivatives, a row for each group.
     values: Vec<Points>,
     gradient: [Vec<Points>; 3],
-    /// What a loss has of rates and of forces inside the element.
+    /// The derivatives of a loss by rates and by forces inside the element.
     within: Option<[Vec<Points>; 2]>,
     pub(super) mu: Vec<Points>,
     pub(super) seeds: Vec<Points>,
@@ -40,7 +42,7 @@ pub(super) struct Iteration {
     pushed: Vec<Points>,
 }
 
-/// Which places of a pattern belong to one block, with their rows and columns.
+/// The places of a sparsity pattern that belong to one block, with their rows and columns.
 #[derive(Clone, Debug)]
 struct Part {
     range: Range<usize>,
@@ -80,7 +82,7 @@ fn grouped(matrix: &[f64], columns: usize) -> Vec<Points> {
 }
 
 impl Iteration {
-    /// Of a collocated element.
+    /// The iteration for a collocated element.
     pub(super) fn new(scheme: &SchemeRef<'_>, pattern: &Pattern, inertia: Inertia) -> Self {
         let (points, n) = (scheme.points(), inertia.inverse.len());
         let masses = &inertia.mass;
@@ -109,7 +111,7 @@ impl Iteration {
         }
     }
 
-    /// Second derivatives at the places of the element.
+    /// Evaluates the second derivatives at the points of the element.
     pub(super) fn linearise<M: Model>(
         &mut self,
         model: &M,
@@ -132,7 +134,7 @@ impl Iteration {
         }
     }
 
-    /// What the seeds of forces make of velocities.
+    /// The contributions of the seeds of forces to those of velocities.
     pub(super) fn set_by_velocities(&self, sums: &mut [Points]) {
         sums.fill(ZERO);
         let n = self.inverse_mass.len();
@@ -145,7 +147,8 @@ impl Iteration {
         }
     }
 
-    /// Moves λ over the element, and leaves μ and the seeds of forces; false where the iteration does not contract, and λ stays.
+    /// Moves λ backwards over the element and leaves μ and the seeds of forces; false, with λ unchanged, where the
+    /// iteration does not contract.
     pub(super) fn pull(&mut self, h: f64, within: &Within, lambda: &mut [f64]) -> bool {
         let rows = |rows: &[f64]| -> Vec<Points> {
             let n = self.inverse_mass.len();
@@ -196,7 +199,7 @@ struct Solve<'a> {
     lambda: &'a [f64],
 }
 
-/// In wide registers, with the same roundings.
+/// Compiled for the widest registers, with the same roundings.
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 impl pulp::NullaryFnOnce for Solve<'_> {
     type Output = bool;
@@ -281,7 +284,7 @@ impl Solve<'_> {
                     }
                     for lane in 0..4 {
                         let change = (row.0[lane] - old.0[lane]).abs();
-                        // A maximum would ignore what is not a number.
+                        // `f64::max` would ignore a NaN.
                         let largest = increment.0[lane];
                         let is_larger = change > largest || change.is_nan();
                         increment.0[lane] = if is_larger { change } else { largest };

@@ -1,4 +1,4 @@
-//! Kernels of run-time length in numbers that write down their operations (T-149).
+//! Reverse-mode differentiation of kernels of run-time length by a tape (T-149).
 
 use crate::family::model::{Gradient, Model};
 use crate::family::pattern::Pattern;
@@ -9,10 +9,11 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::RefCell;
 
-/// Numbers at some points.
+/// Values at several points.
 pub(super) type Points = Lanes<LANES>;
 
-/// Adds Σ weights · ∂(first derivatives and forces)/∂a at some points to the sum of every parameter a. Weights are those of the derivatives by z, by q, and of forces.
+/// Adds Σ weights · ∂(first derivatives and forces)/∂a at several points to the sum of every parameter a. The weights
+/// are those of the derivatives by z, by q, and of the forces.
 pub(super) fn add_of_points<M: Model>(
     tape: &mut Tape,
     model: &M,
@@ -29,7 +30,8 @@ pub(super) fn add_of_points<M: Model>(
     tape.read(ends.into_iter().zip(weights));
 }
 
-/// Adds Σ weights · ∂y/∂(a, q, z) of results y at one place to the sums of parameters and of what follows them: coordinates, then velocities (momenta).
+/// Adds Σ weights · ∂y/∂(a, q, z) of results y at one place to the sums of the parameters a, and of the variables after
+/// them: coordinates, then velocities (momenta).
 pub(super) fn add_of_place<M: Model>(
     tape: &mut Tape,
     model: &M,
@@ -56,7 +58,8 @@ pub(super) fn add_of_place<M: Model>(
     tape.read(ends.into_iter().zip(&weights));
 }
 
-/// Adds Σ weights · ∂(φ, a, A)/∂a at some points to the sum of every parameter a; A by the places of its pattern.
+/// Adds Σ weights · ∂(φ, a, A)/∂a at several points to the sum of every parameter a; A in the order of its sparsity
+/// pattern.
 pub(super) fn add_of_rows<M: Model>(
     tape: &mut Tape,
     model: &M,
@@ -72,7 +75,7 @@ pub(super) fn add_of_rows<M: Model>(
     tape.read(ends.into_iter().zip(weights));
 }
 
-/// The same at one place, without φ, with what weights have of coordinates in the places behind parameters.
+/// The same at one place, without φ; the derivatives by coordinates are in the places after those of the parameters.
 pub(super) fn add_of_rows_at<M: Model>(
     tape: &mut Tape,
     model: &M,
@@ -89,7 +92,7 @@ pub(super) fn add_of_rows_at<M: Model>(
     tape.read(ends.into_iter().zip(&weights));
 }
 
-/// Where the operations of φ, a and A stand.
+/// The places on the tape of φ, a and A.
 fn rows<M: Model>(model: &M, time: Taped<'_>, q: &[Taped<'_>], pattern: &Pattern) -> Vec<u32> {
     let (m, zero) = (model.constraints(), Taped::of([0.0; LANES]));
     let (mut phi, mut drift) = (vec![zero; m], vec![zero; m]);
@@ -110,7 +113,7 @@ fn variables<'t>(
         .collect()
 }
 
-/// Where the operations of first derivatives and forces stand.
+/// The places on the tape of the first derivatives and forces.
 fn first<M: Model>(model: &M, time: Taped<'_>, q: &[Taped<'_>], z: &[Taped<'_>]) -> Vec<u32> {
     let mut results = vec![Taped::of([0.0; LANES]); 3 * q.len()];
     let (by_z, others) = results.split_at_mut(q.len());

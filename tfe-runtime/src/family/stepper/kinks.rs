@@ -12,9 +12,10 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 impl<M: Model> Stepper<'_, M> {
-    /// The same with steps that end where a force has a kink or a jump, and go on behind it: `abs`, `sign`, `min`, `max` and `select` choose by the sign of functions of the
-    /// state, of each site its own, and elements in which none changes its sign keep their order. [`Statistics::kinks`](crate::Statistics::kinks) counts the crossings. Models without such
-    /// functions step as before.
+    /// The same stepper, with steps that end where a force has a kink or a jump, and continue behind it. `abs`, `sign`,
+    /// `min`, `max` and `select` choose by the signs of functions of the state, different ones at each site; elements
+    /// in which none changes its sign have their full order. [`Statistics::kinks`](crate::Statistics::kinks) counts the
+    /// crossings. Models without such functions are stepped as before.
     #[must_use]
     pub fn at_kinks(self) -> Self {
         Self {
@@ -23,7 +24,8 @@ impl<M: Model> Stepper<'_, M> {
         }
     }
 
-    /// Whether kernels choose by the sign of anything; where they do not nobody asks again. A start without a velocity tells nothing: the step says why.
+    /// Whether kernels have branches that depend on a sign; if they have none, this is not evaluated again. At a start
+    /// without velocity the answer is unknown: the step reports the reason.
     pub(super) fn has_kinks(&mut self, t: f64, state: &FamilyState) -> bool {
         let is_right = state.q.len() == self.length && state.p.len() == self.length;
         let mut switches = Vec::new();

@@ -1,14 +1,14 @@
-//! Why a step of a family has no derivative.
+//! Why a step of a model of run-time length has no derivative.
 
 use crate::error::StepError;
 use crate::family::error::ModelError;
 use core::fmt;
 
-/// Why there is no derivative of a step of a family.
+/// Why the derivative of a step of a model of run-time length could not be computed.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum OperatorError {
-    /// The model does not fit together, or families cannot do what was asked for.
+    /// The model is inconsistent, or the request is not supported.
     Family(ModelError),
     /// The step itself failed, or its tangent is singular.
     Step(StepError),
@@ -16,9 +16,9 @@ pub enum OperatorError {
     Cut,
     /// A vector is not as long as the phase space.
     Shape {
-        /// Numbers that are needed.
+        /// The required length.
         needed: usize,
-        /// Numbers that were given.
+        /// The length provided.
         given: usize,
     },
 }

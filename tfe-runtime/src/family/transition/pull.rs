@@ -1,4 +1,5 @@
-//! The derivative of a step of a family from the left: a row of phase space times it (T-127, T-160).
+//! The adjoint of a step of a model of run-time length: the product of a row of phase space with its derivative (T-127,
+//! T-160).
 
 use super::TransitionOperator;
 use crate::condense::add_multiple;
@@ -9,19 +10,20 @@ use crate::scheme::Tables as _;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// What a row of phase space weighs at the points of an element, a row of n for each point.
+/// The weights that a row of phase space gives to the points of an element, a row of n for each point.
 pub(in crate::family) struct Seeds {
-    /// Of L_v and of F.
+    /// The weights of L_v and of F.
     pub(in crate::family) momenta: Vec<f64>,
     pub(in crate::family) forces: Vec<f64>,
-    /// What these make of velocities.
+    /// Their contributions to the weights of velocities.
     pub(in crate::family) by_velocities: Vec<f64>,
-    /// Of constraints.
+    /// The weights of constraints.
     pub(in crate::family) held: Option<Weights>,
 }
 
 impl TransitionOperator {
-    /// Writes the row λ of phase space times the derivative for λ, with what a loss has of the inside, and gives what λ weighs at the points (T-127).
+    /// Replaces the row λ of phase space by its product with the derivative, including the derivatives of a loss by the
+    /// inside of the element, and returns the weights of the points (T-127).
     pub(in crate::family) fn pull(&self, inside: Option<&InsideLoss>, lambda: &mut [f64]) -> Seeds {
         let scheme = self.table.view();
         let (n, h) = (self.end.q.len(), self.h);
@@ -29,7 +31,8 @@ impl TransitionOperator {
         let within = Within::of(inside, &scheme, h);
         let held = self.held.as_ref();
         let (of_p, of_q) = lambda.split_at_mut(n);
-        // Of L_v at the points, and of the momentum at the start: what the polynomial of momenta that jump goes through.
+        // The weights of L_v at the points and of the momentum at the start, through which the polynomial of momenta
+        // with jumps passes.
         let mut through = vec![0.0; points * n];
         let mut of_start = vec![0.0; n];
         if let (Some(_), Some(inside)) = (held, inside) {
@@ -128,7 +131,7 @@ impl TransitionOperator {
         seeds
     }
 
-    /// Adds what weights of L_v and F at one point are of coordinates and of velocities.
+    /// Adds the contributions of the weights of L_v and F at one point to those of coordinates and of velocities.
     fn bend_back(
         &self,
         l: usize,
