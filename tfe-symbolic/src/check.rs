@@ -1,7 +1,7 @@
-//! Declarations: which names stand for what, which arguments are missing, doubled or at odds.
+//! Checks of declarations: what each name stands for, and which arguments are missing, repeated or in conflict.
 //!
-//! One small function a rule. Nothing here looks inside formulas; that is the business of [`lower`](crate::lower). May import `expr`,
-//! `vocabulary`, `diagnostic`, `syntax` and `model`.
+//! There is one small function for each rule. Formulas are not examined here, but in [`lower`](crate::lower). May
+//! import `expr`, `vocabulary`, `diagnostic`, `syntax` and `model`.
 
 mod solver;
 mod transformation;
@@ -15,38 +15,38 @@ use crate::syntax::ast::{Array, Expr, ExprKind, Item, Name, Pass, Range, Spanned
 use crate::syntax::context::{Context, FieldKind, Length};
 use crate::vocabulary::{Argument, is_function};
 
-/// The most coordinates of literal arrays: beyond it, tables of the engine get out of hand.
+/// The largest number of coordinates in literal arrays: beyond it, tables of the engine become too large.
 pub const MAX_COORDINATES: usize = 10_000;
 
-/// The most inputs a model can have.
+/// The largest number of inputs that a model can have.
 pub const MAX_INPUTS: usize = 16;
 
-/// The methods that the macro gives every model; outputs become methods beside them.
+/// The methods that the macro gives every model; outputs become further methods.
 const METHODS: &[&str] = &["state", "structure"];
-/// The functions that the macro gives models made from another.
+/// The functions that the macro gives models made from another model.
 const VARIANT_METHODS: &[&str] = &["of", "of_state"];
-/// One more of models with a time transformation.
+/// A further function, for models with a time transformation.
 const CLOCK_METHOD: &str = "state_at";
 
 /// What a name in a formula stands for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Symbol {
-    /// The coordinate (array) of this number.
+    /// The coordinate (or array) with this index.
     Coordinate(usize),
-    /// The momentum (array) of this number.
+    /// The momentum (or array) with this index.
     Momentum(usize),
-    /// The input of this number.
+    /// The input with this index.
     Input(usize),
-    /// The `let` of this number.
+    /// The `let` with this index.
     Let(usize),
-    /// The field of this number.
+    /// The field with this index.
     Field(usize),
     /// A const parameter.
     ConstParameter,
 }
 
 impl Symbol {
-    /// The role that messages speak of.
+    /// The role by which messages refer to it.
     pub fn role(&self) -> Role {
         match self {
             Self::Coordinate(_) => Role::Coordinate,
@@ -77,7 +77,7 @@ impl Slots {
     }
 }
 
-/// The arguments of the attribute, sorted and with their names known.
+/// The arguments of the attribute, sorted by kind, with their names resolved.
 #[derive(Clone, Debug, Default)]
 pub struct Model {
     /// What the names stand for.
@@ -86,9 +86,9 @@ pub struct Model {
     pub coordinates: Vec<Slots>,
     /// The momenta.
     pub momenta: Vec<Slots>,
-    /// How many coordinates there are.
+    /// The number of coordinates.
     pub dof: Affine,
-    /// The numbers given at run time.
+    /// The inputs: numbers given at run time.
     pub inputs: Vec<Name>,
     /// The `let`s, in order.
     pub lets: Vec<(Name, Expr)>,
@@ -98,7 +98,7 @@ pub struct Model {
     pub forces: Vec<(Expr, Expr)>,
     /// The Rayleigh function.
     pub dissipation: Option<Expr>,
-    /// The rate dt/dτ, and where the argument stands.
+    /// The rate dt/dτ, and the place of the argument.
     pub time_transformation: Option<(Expr, Span)>,
     /// The constraints: name, range of a family, value.
     pub constraints: Vec<(Name, Option<Range>, Expr)>,
@@ -110,30 +110,30 @@ pub struct Model {
     pub solvers: Vec<Solver>,
     /// The models made from this one: name and passes.
     pub variants: Vec<(Name, Vec<Pass>)>,
-    /// Where `tfe` is.
+    /// The path of the crate `tfe`.
     pub crate_path: Option<String>,
-    /// Whether an argument is missing because of a mistake, so that "unused" would be a rash word.
+    /// Whether an argument is missing because of a mistake, so that nothing can be reported as unused.
     pub incomplete: bool,
     /// Whether such an argument may have declared names.
     pub names_missing: bool,
     /// Fields of a type that formulas cannot use.
     other_fields: Vec<String>,
-    /// The names of all solvers, those with mistakes too.
+    /// The names of all solvers, including those with mistakes.
     solver_names: Vec<String>,
-    /// Where the elements of all solvers stand, those with mistakes too.
+    /// The places of the elements of all solvers, including those with mistakes.
     solver_spans: Vec<Span>,
-    /// The elements of `solvers` as written, and where.
+    /// The elements of `solvers` as written, and their places.
     pub(crate) solver_elements: Vec<(String, Span)>,
 }
 
-/// What the parser made of an attribute.
+/// The result of parsing an attribute.
 #[derive(Clone, Debug, Default)]
 pub struct Arguments {
-    /// The arguments that it could read; the spans are those of their first words.
+    /// The arguments that could be read; the spans are those of their first words.
     pub items: Vec<Spanned<Item>>,
-    /// The whole text, for mistakes that are omissions.
+    /// The span of the whole text, for mistakes that are omissions.
     pub whole: Span,
-    /// Whether it could not read some.
+    /// Whether some arguments could not be read.
     pub incomplete: bool,
     /// Whether those may have declared names.
     pub names_missing: bool,
@@ -210,7 +210,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
     model.transformation(bag);
     model.check_variants(context, bag);
     if incomplete {
-        // What seems to be missing may be what could not be read.
+        // What seems to be missing may be in an argument that could not be read.
         return model;
     }
     if !seen.contains(&Argument::Coordinates) {
@@ -228,7 +228,7 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
     model
 }
 
-/// Gives each array its place in the flat vector.
+/// Assigns to each array its place in the flat vector.
 fn slots(arrays: Vec<Array>, context: &Context, bag: &mut Bag) -> Vec<Slots> {
     let mut first = Affine::default();
     let mut slots = Vec::new();
@@ -249,7 +249,7 @@ fn slots(arrays: Vec<Array>, context: &Context, bag: &mut Bag) -> Vec<Slots> {
                     limit: MAX_COORDINATES,
                 },
             );
-            // Small enough for all that follows, and of unknown length, hence without follow-ups.
+            // Small enough for all later steps, and of unknown length, so that no further messages follow.
             slots.push(Slots {
                 length: Some(unknown_length(&name.node)),
                 name,
@@ -268,7 +268,7 @@ fn slots(arrays: Vec<Array>, context: &Context, bag: &mut Bag) -> Vec<Slots> {
     slots
 }
 
-/// A length that nothing compares with, after a mistake in the true one.
+/// A length that is never compared with anything, for use after a mistake in the true one.
 fn unknown_length(name: &str) -> Affine {
     Affine::symbol(IndexSymbol::Field(format!("length of {name}")))
 }
@@ -328,7 +328,7 @@ fn array_length(name: &Name, length: &Expr, context: &Context, bag: &mut Bag) ->
     unknown_length(&name.node)
 }
 
-/// The keywords of Rust that cannot be written as raw identifiers, hence name nothing in generated code.
+/// The keywords of Rust that cannot be written as raw identifiers, and therefore cannot be names in generated code.
 const KEYWORDS_WITHOUT_RAW_FORM: &[&str] = &["crate", "self", "super", "Self"];
 
 /// Whether Rust refuses the name even in its raw form.
@@ -350,7 +350,7 @@ pub(crate) fn unusable_type_name(name: &str) -> Option<Kind> {
     }
 }
 
-/// Checks a new name against the words of the language.
+/// Checks a new name against the reserved words of the language.
 pub(crate) fn reserved(name: &str, field: bool) -> Option<Kind> {
     if let Some(kind) = keyword(name) {
         return Some(kind);
@@ -430,7 +430,7 @@ impl Model {
                 bag.push(span, kind);
             }
             match self.symbols.get(&name) {
-                // A field that formulas cannot use does not stand in the way.
+                // A field that formulas cannot use does not conflict with the name.
                 Some(taken) if !self.other_fields.contains(&name) => {
                     bag.push(
                         span,
@@ -447,7 +447,7 @@ impl Model {
         }
     }
 
-    /// Adds up the lengths of the coordinates.
+    /// Computes the number of coordinates.
     fn sizes(&mut self, bag: &mut Bag) {
         let mut dof = Affine::default();
         for slots in &self.coordinates {
@@ -485,7 +485,7 @@ impl Model {
         self.dof.is_of_run_time() && self.coordinates.iter().all(known)
     }
 
-    /// Arguments that need the number of coordinates.
+    /// Refuses arguments that need a fixed number of coordinates in models of run-time length.
     fn only_at_fixed_length(&self, bag: &mut Bag) {
         if self.is_of_run_time_length()
             && let Some(parameter) = self.sensitivities.first()
@@ -495,7 +495,7 @@ impl Model {
         }
     }
 
-    /// What stands beside inputs has to know what they are.
+    /// Refuses arguments that cannot be combined with inputs.
     fn inputs(&self, bag: &mut Bag) {
         let Some(first) = self.inputs.first() else {
             return;
@@ -541,8 +541,8 @@ impl Model {
             if let Some(kind) = reserved(name, false).or_else(|| self.clock_momentum(name)) {
                 bag.push(*span, kind);
             }
-            // An output may be called like the `let` that it shows; a coordinate or momentum has
-            // its column in the results already.
+            // An output may have the name of the `let` that it shows; a coordinate or momentum has its column in the
+            // results already.
             let taken = match self.symbols.get(name) {
                 Some(symbol @ (Symbol::Coordinate(_) | Symbol::Momentum(_))) => Some(symbol.role()),
                 _ if self.is_method(name) => Some(Role::Method),
@@ -568,7 +568,7 @@ impl Model {
             || (!self.variants.is_empty() && VARIANT_METHODS.contains(&name))
     }
 
-    /// Names of constraints stand in no formula, but in results beside outputs.
+    /// Checks the names of constraints, which do not appear in formulas, but in results beside outputs.
     fn constraint_names(&self, bag: &mut Bag) {
         let mut names: Vec<&str> = Vec::new();
         for (Spanned { node: name, span }, ..) in &self.constraints {

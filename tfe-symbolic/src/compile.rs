@@ -11,8 +11,7 @@ use crate::vocabulary::Argument;
 
 /// Reads a whole attribute: splits, parses, checks, lowers.
 ///
-/// `arguments` is what stands between the parentheses of `#[dynamics(…)]`; spans are byte ranges in
-/// it.
+/// `arguments` is the text between the parentheses of `#[dynamics(…)]`; spans are byte ranges in it.
 ///
 /// # Errors
 /// All mistakes found, in the order of the text.
@@ -24,7 +23,7 @@ pub fn declare(arguments: &str, context: &Context) -> Result<Declared, Vec<Diagn
     let declared = lower(&model, &context, &mut bag);
     match bag.finish(declared)? {
         Some(declared) => Ok(declared),
-        // Lowering without a result has left its reason in the bag.
+        // If lowering has no result, the reason is in the bag.
         None => Err(Vec::new()),
     }
 }

@@ -1,10 +1,9 @@
-//! Formulas to the arena: names resolved, `dot()` by the chain rule, vectors to components, short
-//! sums written out.
+//! Lowers formulas to expressions of the arena: names are resolved, `dot()` is expanded by the chain rule, vectors
+//! become components, and short sums are written out.
 //!
-//! Sums over long or generic ranges stay loops. In an energy or a dissipation a loop may stand under
-//! sums and products with other factors only, because its derivatives must be loops over local
-//! terms again; under anything else it is written out, or reported where it is too long for that.
-//! Forces and observables may use loops anywhere.
+//! Sums over long or generic ranges stay loops. In an energy or a dissipation, a loop may appear under sums, and under
+//! products with other factors, only, because its derivatives have to be loops over local terms again. Under anything
+//! else it is written out, or reported where it is too long for that. Forces and observables may use loops anywhere.
 //!
 //! May import `check`, `variants`, `derive` for kinds of constraints, and what these may import.
 
@@ -44,7 +43,7 @@ pub const LONGEST_WRITTEN_OUT: u64 = 512;
 
 /// Lowers a checked model.
 ///
-/// `None` if there is no energy to speak of; the reason is in the bag.
+/// `None` if there is no energy; the reason is in the bag.
 pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared> {
     let mut lowerer = Lowerer::new(model, context, bag);
     let form = model
@@ -73,7 +72,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     let constraints = lowerer.constraints();
     lowerer.check_solvers(&constraints);
     let sensitivities = lowerer.sensitivities(&constraints);
-    // Mistakes in a `let` that nothing uses are mistakes all the same.
+    // Mistakes in an unused `let` are reported as well.
     for at in 0..model.lets.len() {
         lowerer.named(at);
     }
@@ -120,7 +119,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
         remarks: Vec::new(),
         notation: formulas::formulas(model),
     };
-    // What is made from a wrong model would repeat its mistakes.
+    // A model made from a wrong one would repeat its mistakes.
     if bag.is_empty() {
         for (name, steps) in &variants {
             match variants::variant(&declared, name, steps, &all_fields) {
@@ -129,7 +128,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
             }
         }
     }
-    // Models made from this one may lack what the remarks are about.
+    // Models made from this one may lack what the remarks refer to.
     declared.remarks = remarks;
     let Some((rate, (_, span))) = rate.zip(model.time_transformation.as_ref()) else {
         return Some(declared);
@@ -143,7 +142,7 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     }
 }
 
-/// What a formula evaluates to. `None` in the functions below stands for "reported already".
+/// The value of a formula. `None` in the functions below stands for "already reported".
 #[derive(Clone, Debug)]
 enum Value {
     Scalar(ExprId),
@@ -151,7 +150,7 @@ enum Value {
     Error,
 }
 
-/// What `dot()` makes of a coordinate.
+/// The meaning of `dot()` of a coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum DotRule {
     /// Its velocity.
@@ -162,7 +161,7 @@ enum DotRule {
     ByHamiltonian,
 }
 
-/// Which rules hold for the formula at hand.
+/// The rules that hold in the present formula.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Setting {
     dot: DotRule,
@@ -170,21 +169,21 @@ struct Setting {
     linear_loops: bool,
 }
 
-/// The index of a sum around the formula at hand.
+/// The index of a sum around the present formula.
 #[derive(Clone, Debug)]
 struct Index {
     name: String,
     variable: LoopVariable,
     start: Affine,
     end: Affine,
-    /// What it is more than its variable, which begins at zero or above: programs have no loops below zero.
+    /// Its difference to its variable, which starts at zero or above: programs have no loops below zero.
     offset: Affine,
-    /// Its value, where the sum is written out turn by turn while it is lowered.
+    /// Its value, where the sum is unrolled turn by turn while it is lowered.
     at: Option<Affine>,
 }
 
 impl Index {
-    /// What the index stands for in formulas and in other indices.
+    /// The value of the index in formulas and in other indices.
     fn value(&self) -> Affine {
         match &self.at {
             Some(at) => at.clone(),
@@ -197,7 +196,7 @@ impl Index {
     }
 }
 
-/// A nonlinear expression around a sum that can be written out only if sums around it are.
+/// A nonlinear expression around a sum that can be unrolled only if outer sums are.
 #[derive(Clone, Debug)]
 struct TurnByTurn {
     /// The indices of those sums.
@@ -211,7 +210,7 @@ struct TurnByTurn {
 struct DeclaredPlace {
     /// `constraint(rod[i in 0..n-1])`
     text: String,
-    /// How many of the indices around are its own.
+    /// The number of its own indices among those in scope.
     own: usize,
 }
 
@@ -221,29 +220,29 @@ struct Lowerer<'a> {
     bag: &'a mut Bag,
     graph: Graph,
     setting: Setting,
-    /// What `dot()` means in most formulas; `let`s are kept in this meaning.
+    /// The meaning of `dot()` in most formulas; the values of `let`s are kept for this meaning.
     usual_dot: DotRule,
     /// H, once it is known.
     hamiltonian: Option<ExprId>,
     /// The values of `let`s outside any loop.
     lets: Vec<Option<Value>>,
-    /// Those inside so many loops and under other rules: each is lowered once, however many use it.
+    /// Those inside this many loops and under other rules: each is lowered once, however many formulas use it.
     lets_here: SortedMap<(usize, u32, Setting), Value>,
-    /// Which `let`s hold a `dot()`, themselves or by those they use.
+    /// Which `let`s contain a `dot()`, directly or through other `let`s.
     rates: Vec<bool>,
-    /// How many `let`s stand before the formula at hand.
+    /// The number of `let`s that precede the present formula.
     visible_lets: usize,
     /// The sums around it, outermost first.
     indices: Vec<Index>,
     /// The declaration around it, where that is one that messages name.
     place: Option<DeclaredPlace>,
-    /// Loops around the `let` at hand that its formula does not see.
+    /// The number of loops around the present `let` that its formula does not see.
     hidden_loops: u32,
     /// The largest number of terms of the sums met since it was last cleared; `None`: generic.
     terms: Option<u64>,
     /// The number of terms of each loop that was made.
     loops: Map<ExprId, Option<u64>>,
-    /// Set where the sums around the formula at hand have to be written out turn by turn.
+    /// Set if the sums around the present formula have to be unrolled turn by turn.
     turn_by_turn: Option<TurnByTurn>,
     /// The lengths of sums of vectors, by the place of their indices.
     vector_sums: Map<Span, usize>,
@@ -253,9 +252,9 @@ struct Lowerer<'a> {
     fields: Vec<bool>,
     /// Which inputs formulas use.
     inputs: Vec<bool>,
-    /// What must hold of lengths that are known at run time only.
+    /// Requirements on lengths that are known only at run time.
     requirements: Vec<Requirement>,
-    /// What is unusual about the declaration, though no mistake.
+    /// Unusual properties of the declaration that are not mistakes.
     remarks: Vec<String>,
 }
 

@@ -1,5 +1,5 @@
-//! Passes that make results cheaper, first on expressions, then on plans of operations with at most two operands. May import `expr`, and
-//! `program` for its measure of cost.
+//! Passes that make results cheaper, first on expressions, then on plans of operations with at most two operands. May
+//! import `expr`, and `program` for the measure of cost.
 
 pub(crate) mod angles;
 pub(crate) mod binarize;

@@ -8,10 +8,11 @@
 //!         ──statements, StatementOrder──▶ program                                         `schedule`
 //! ```
 //!
-//! A pass makes results cheaper and changes none of their values but by rounding. What rounding may do is checked for every plan by one guard
-//! (`optimise/guard`), against the formula as declared. What is cheaper is said by one measure (`program/cost`). Limits, which keep the time of
-//! expansion near-linear in the size of a model, are constants beside each pass. The passes with
-//! their contracts and limits are listed in `optimise/passes.rs`. This folder may import `derive`, `optimise`, `schedule`, and what these may import.
+//! A pass makes results cheaper and changes their values only by rounding. For every plan one guard (`optimise/guard`)
+//! compares the rounding errors with those of the formula as declared. All costs are measured in one way
+//! (`program/cost`). Limits that keep the time of expansion nearly linear in the size of a model are constants beside
+//! each pass. The passes with their contracts and limits are listed in `optimise/passes.rs`. This folder may import
+//! `derive`, `optimise`, `schedule`, and what these may import.
 
 mod programs;
 mod select_plan;

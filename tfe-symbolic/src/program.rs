@@ -1,7 +1,7 @@
 //! Straight-line programs with loops: what is emitted as Rust, and what the interpreter runs.
 //!
-//! CONTRACT between the engine (which schedules programs) and the emitter. The files of the folder count, run and print programs. May import
-//! `expr` only.
+//! This is the contract between the engine, which schedules programs, and the emitter. The files of the folder count,
+//! run and print programs. May import `expr` only.
 
 pub(crate) mod cost;
 pub mod count;
@@ -28,7 +28,7 @@ pub enum Operand {
     Temporary(Temporary),
     /// A number.
     Constant(f64),
-    /// What the kernel is given.
+    /// An input of the kernel.
     Input(Input),
 }
 
@@ -45,7 +45,7 @@ pub enum Operation {
     Divide(Operand, Operand),
     /// `−a`
     Negate(Operand),
-    /// `a` to an integer power that is not worth spelling out as products
+    /// `a` to an integer power that is not written as products
     IntegerPower(Operand, i32),
     /// `a^b`
     Power(Operand, Operand),
@@ -99,7 +99,7 @@ pub enum Statement {
         /// What is added
         value: Operand,
     },
-    /// `target = value`, inside the loop: what the next turn begins with
+    /// `target = value`, inside the loop: the value with which the next turn begins
     Assign {
         /// The running sum
         target: Temporary,
@@ -126,8 +126,8 @@ pub enum Statement {
         /// Add to what is there (the program has stored it before, or cleared the array: see [`Statement::Clear`])
         accumulate: bool,
     },
-    /// Entries that follow from others: output (k, k) for k in 0..length, counted from the one given, becomes −Σ output (l, k) over l ≠ k, and
-    /// so does the one on the other side of the diagonal of the array
+    /// Entries that follow from others: for k in 0..length, output (k, k), counted from the given one, becomes −Σ
+    /// output (l, k) over l ≠ k, and so does its mirror image on the other side of the diagonal of the array
     Balance {
         /// The first of the entries
         output: Place,

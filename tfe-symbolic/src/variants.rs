@@ -1,12 +1,14 @@
-//! Models made from models: each pass turns a declared model into another one, after which everything sees an ordinary model.
+//! Models made from models: each pass turns a declared model into another one, which is then treated like any other
+//! model.
 //!
 //! ```text
 //! Declared ──pass──▶ Declared ──pass──▶ … ──▶ Variant
 //! ```
 //!
-//! A pass works on lowered expressions, so what it makes is differentiated like anything else. Coordinates are found by their names in the
-//! model at hand, which passes before may have changed; values of entries hold nothing of the state and mean the same in all of them.
-//! May import `derive` for kinds of constraints and what a sign decides, `model`, `syntax`, `diagnostic` and `expr`.
+//! A pass works on lowered expressions, so that its result is differentiated like any other model. Coordinates are
+//! found by their names in the present model, which earlier passes may have changed; values of entries do not depend on
+//! the state and mean the same in all of them. May import `derive` for kinds of constraints and what a sign decides,
+//! `model`, `syntax`, `diagnostic` and `expr`.
 
 mod as_syntax;
 mod elastic;
@@ -86,11 +88,11 @@ type Mistake = (Span, Kind);
 /// A model on its way from pass to pass.
 struct Reduction {
     model: Declared,
-    /// The fields that passes have added, with what they are.
+    /// The fields that passes have added, with their meanings.
     added: Vec<(String, String)>,
-    /// The coordinates that are left, by their numbers in the original; as long as only cyclic ones have gone.
+    /// The remaining coordinates, by their indices in the original; as long as only cyclic ones have been removed.
     kept: Vec<usize>,
-    /// Those that have gone, in the order of the fields of their momenta.
+    /// Those that were removed, in the order of the fields of their momenta.
     from_state: Vec<usize>,
 }
 
@@ -107,11 +109,11 @@ impl Reduction {
     }
 }
 
-/// The model `name`, made from another one by passes from left to right; `fields` are all that formulas and entries use, in the order of the
-/// struct.
+/// The model `name`, made from another one by passes from left to right; `fields` are all fields that formulas and
+/// entries use, in the order of the struct.
 ///
 /// # Errors
-/// The first thing that stands in the way.
+/// The first obstacle.
 pub(crate) fn variant(
     original: &Declared,
     name: &Name,

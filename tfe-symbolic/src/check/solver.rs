@@ -8,7 +8,7 @@ use crate::syntax::context::Context;
 use crate::vocabulary::element::{Element, Family, Rule};
 use crate::vocabulary::{ELEMENTS, MAX_POINTS, RULES};
 
-/// The most nodes an element can have.
+/// The largest number of nodes of an element.
 const MAX_NODES: u32 = 12;
 
 impl Model {
@@ -54,7 +54,7 @@ impl Model {
             bag.push(syntax.nodes.span, Kind::NodesOutOfRange { nodes });
         }
         let rule = quadrature_rule(syntax, bag);
-        // What comes after relies on numbers of nodes that elements can have.
+        // Later steps rely on a valid number of nodes.
         if let (Some(family), Some(rule), Some(nodes)) = (family, rule, count) {
             self.solvers.push(Solver {
                 name: name.node.clone(),

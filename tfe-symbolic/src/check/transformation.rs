@@ -1,4 +1,4 @@
-//! What a time transformation asks of the arguments beside it.
+//! The requirements of a time transformation on the other arguments.
 
 use super::Model;
 use crate::diagnostic::{Bag, Kind, Role};
@@ -6,7 +6,7 @@ use crate::expr::input::IndexSymbol;
 use crate::model::declared::{CLOCK_MOMENTUM, Form};
 
 impl Model {
-    /// A Hamiltonian, a number of coordinates known here, and nothing that p_t = −H stands in the way of.
+    /// Requires a Hamiltonian, a number of coordinates that is known here, and that nothing conflicts with p_t = −H.
     pub(super) fn transformation(&self, bag: &mut Bag) {
         let Some((_, span)) = self.time_transformation else {
             return;
@@ -49,7 +49,7 @@ impl Model {
         }
     }
 
-    /// The momentum of the time, where there is one, has its name already.
+    /// The momentum of the time, if there is one, has reserved its name.
     pub(super) fn clock_momentum(&self, name: &str) -> Option<Kind> {
         let is_taken = self.time_transformation.is_some() && name == CLOCK_MOMENTUM;
         is_taken.then(|| Kind::NameClash {

@@ -7,7 +7,7 @@ use crate::syntax::context::Context;
 use crate::vocabulary::PASSES;
 
 impl Model {
-    /// Names, and the words of the passes; their entries are formulas.
+    /// Checks the names, and the words of the passes; the entries of passes are formulas, which are checked later.
     pub(super) fn check_variants(&self, context: &Context, bag: &mut Bag) {
         for (at, (name, passes)) in self.variants.iter().enumerate() {
             if let Some(taken) = self.taken_by(at, name, context) {

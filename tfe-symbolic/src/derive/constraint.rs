@@ -1,12 +1,13 @@
-//! Constraints: their rows, the derivatives that tangents need, and what kind of equation they are.
+//! Constraints: their rows, the derivatives that tangents need, and the kind of each equation.
 //!
 //! ```text
 //! holonomic   φ(q, t) = 0                  A = ∂φ/∂q   a = ∂φ/∂t
 //! velocity    ψ = A(q, t) v + a(q, t) = 0
 //! ```
 //!
-//! The velocity v is a leaf of its own in models of both forms. The rate Ȧ = ∂A/∂q v + ∂A/∂t is taken with v as the rate of q, so that
-//! ∂Ȧ/∂v = ∂A/∂q and ∂Ȧ/∂q is the rate of ∂A/∂q: three of the five arrays of second derivatives come from one.
+//! The velocity v is a leaf of its own in models of both forms. The rate Ȧ = ∂A/∂q v + ∂A/∂t is formed with v as the
+//! rate of q, so that ∂Ȧ/∂v = ∂A/∂q, and ∂Ȧ/∂q is the rate of ∂A/∂q: three of the five arrays of second derivatives
+//! follow from one.
 
 pub(crate) mod sites;
 
@@ -20,9 +21,9 @@ use crate::expr::sorting::sort;
 use crate::model::declared::{Constraint, ConstraintKind};
 use crate::program::{Array, Place};
 
-/// A and a of one constraint.
+/// The row A and the drift a of one constraint.
 pub(crate) struct Row {
-    /// The entries of A that do not vanish, by coordinate.
+    /// The non-zero entries of A, by coordinate.
     pub(crate) entries: Vec<(Affine, ExprId)>,
     /// a
     pub(crate) drift: ExprId,
@@ -59,7 +60,7 @@ impl Row {
     }
 }
 
-/// What of each constraint is added where.
+/// The entries of all constraint arrays.
 pub(crate) fn entries(graph: &mut Graph, constraints: &[Constraint]) -> Vec<Entry> {
     let mut collected = Collected::default();
     for (number, constraint) in constraints.iter().enumerate() {
@@ -111,7 +112,8 @@ impl Collected {
         }
     }
 
-    /// The derivatives of Aᵀμ = ∂(Σ μ ψ)/∂v over all velocity constraints: rolling contacts share long rotations.
+    /// The derivatives of Aᵀμ = ∂(Σ μ ψ)/∂v over all velocity constraints together, because rolling contacts share long
+    /// rotations.
     fn contacts(&mut self, graph: &mut Graph, constraints: &[Constraint]) {
         let mut terms = Vec::new();
         for constraint in constraints {
@@ -139,7 +141,8 @@ impl Collected {
         for (column, leaf) in leaves(graph, &roots, coordinate) {
             let mut by = Forward::default();
             for (at, value) in covector {
-                // The other half of a symmetric block is the same expression, not another one of the same value.
+                // The other half of a symmetric block is the same expression, and not another expression of equal
+                // value.
                 if symmetric && *at > column {
                     continue;
                 }
@@ -167,7 +170,7 @@ impl Collected {
     }
 }
 
-/// The rate of a leaf at fixed velocities: of a coordinate its velocity, of the time one.
+/// The rate of a leaf at fixed velocities: for a coordinate its velocity, for the time one.
 fn flow(graph: &mut Graph, input: &Input) -> Option<ExprId> {
     match input {
         Input::Time => Some(graph.constant(Constant::ONE)),
@@ -219,7 +222,7 @@ fn leaves(graph: &Graph, roots: &[ExprId], pick: Pick) -> Vec<(Affine, ExprId)> 
     found
 }
 
-/// The first derivatives by all leaves of one kind that do not vanish.
+/// The non-zero first derivatives by all leaves of one kind.
 fn slopes(graph: &mut Graph, of: ExprId, pick: Pick) -> Vec<(Affine, ExprId)> {
     let leaves = leaves(graph, &[of], pick);
     let ids: Vec<ExprId> = leaves.iter().map(|(_, leaf)| *leaf).collect();
@@ -246,7 +249,8 @@ fn holds(graph: &Graph, id: ExprId, pick: Pick) -> bool {
     !leaves(graph, &[id], pick).is_empty()
 }
 
-/// Whether a function with a kink or a jump has a leaf of this kind in its arguments: its derivatives do not tell its degree.
+/// Whether a leaf of this kind is an argument of a function with a kink or a jump, whose derivatives do not tell its
+/// degree.
 fn has_kink_in(graph: &Graph, id: ExprId, pick: Pick) -> bool {
     graph.reachable(&[id]).into_iter().any(|id| {
         let kinked = match graph.node(id) {
@@ -261,12 +265,12 @@ fn has_kink_in(graph: &Graph, id: ExprId, pick: Pick) -> bool {
     })
 }
 
-/// Whether an expression holds velocities.
+/// Whether an expression depends on velocities.
 pub(crate) fn holds_velocity(graph: &Graph, id: ExprId) -> bool {
     holds(graph, id, velocity)
 }
 
-/// Whether an expression holds coordinates or velocities.
+/// Whether an expression depends on coordinates or velocities.
 pub(crate) fn holds_state(graph: &Graph, id: ExprId) -> bool {
     holds_velocity(graph, id) || holds(graph, id, coordinate)
 }
@@ -292,7 +296,7 @@ pub(crate) fn kind(graph: &mut Graph, value: ExprId) -> Option<ConstraintKind> {
     })
 }
 
-/// Whether φ is seen to be a polynomial of at most second degree in the coordinates.
+/// Whether φ is found to be a polynomial of at most second degree in the coordinates.
 fn is_quadratic(graph: &mut Graph, phi: ExprId) -> bool {
     if has_kink_in(graph, phi, coordinate) {
         return false;
@@ -306,7 +310,7 @@ fn is_quadratic(graph: &mut Graph, phi: ExprId) -> bool {
     })
 }
 
-/// Whether ∂A_i/∂q_j = ∂A_j/∂q_i and ∂A_i/∂t = ∂a/∂q_i are seen to hold; without that, no answer is no.
+/// Whether ∂A_i/∂q_j = ∂A_j/∂q_i and ∂A_i/∂t = ∂a/∂q_i are found to hold; false does not prove the contrary.
 fn is_integrable(graph: &mut Graph, row: &Row) -> bool {
     // Where an index is not a number, two leaves may be the same coordinate.
     let known = |at: &Affine| at.as_constant().is_some();
@@ -348,7 +352,7 @@ fn are_equal(graph: &mut Graph, one: ExprId, other: ExprId) -> bool {
     expanded.is_some_and(|id| is_zero(graph, id))
 }
 
-/// The equation without a constant factor: two equations that are multiples of each other have the same.
+/// The equation without a constant factor: it is the same for two equations that are multiples of each other.
 pub(crate) fn normal(graph: &mut Graph, value: ExprId) -> ExprId {
     let value = graph.expanded(value).unwrap_or(value);
     let (_, x) = graph.as_multiple(value);

@@ -1,11 +1,11 @@
-//! From a declared model to the entries of its kernels: which derivative goes where, inside which loops.
+//! From a declared model to the entries of its kernels: the place of each derivative, and the loops around it.
 //!
 //! The energy is split into terms, each a nest of ranges around a body. A body is differentiated once by its *slots*, the distinct leaves
 //! such as `q[i]` and `q[i+1]`. A first derivative by the slot `q[a]` adds to entry a, a second one by two slots adds to (a, b) and to (b, a):
 //! this holds also where both indices happen to be equal.
 //!
-//! A function of sums, such as `sqrt(sum(i in 0..n, q[i]^2))`, couples all with all. There each inner sum S counts as a further leaf of
-//! the body, and the chain rule continues into it: ∂f/∂q = (∂f/∂S)(∂S/∂q), in one more loop.
+//! A function of sums, such as `sqrt(sum(i in 0..n, q[i]^2))`, couples all coordinates. There each inner sum S counts
+//! as a further leaf of the body, and the chain rule continues into it: ∂f/∂q = (∂f/∂S)(∂S/∂q), in one more loop.
 
 use std::cell::RefCell;
 
@@ -91,12 +91,13 @@ impl From<&Declared> for Model {
 pub struct Derivation {
     pub(crate) graph: Graph,
     pub(crate) entries: Vec<Entry>,
-    /// The same in other ways: by the chain rule backward, by the matrix of an energy that is quadratic in z.
+    /// The same entries derived in other ways: by the chain rule backward, by the matrix of an energy that is quadratic
+    /// in z.
     pub(crate) written: Vec<Vec<Entry>>,
     structure: Structure,
     pub(crate) sensitivities: Vec<Parameter>,
     pub(crate) passes: Passes,
-    /// The programs that have been asked for: each is optimised once, which takes most of the time of an expansion.
+    /// The programs requested so far: each is optimised only once, which takes most of the time of an expansion.
     pub(crate) programs: RefCell<Map<Request, Program>>,
 }
 
@@ -106,7 +107,7 @@ impl Derivation {
         Self::of_model(Model::from(declared))
     }
 
-    /// The same, with programs made without one of the passes: to see what a pass is worth.
+    /// The same, with programs made without one of the passes, to measure its effect.
     pub fn without(declared: &Declared, pass: Pass) -> Self {
         Self::by_passes(Model::from(declared), Passes::without(pass))
     }
@@ -169,7 +170,7 @@ impl Derivation {
         for entries in std::iter::once(&mut entries).chain(&mut written) {
             entries.retain(|entry| !vanishing.contains(&entry.place));
         }
-        // What is chosen in a limit is no choice of the model.
+        // Choices introduced to take limits are not choices of the model.
         let structure = Structure::of(&graph, form, &dof, &entries);
         take_limits(
             &mut graph,
@@ -186,7 +187,7 @@ impl Derivation {
         }
     }
 
-    /// Whether ∂/∂z of the energy function holds the time.
+    /// Whether ∂/∂z of the energy function depends on the time.
     pub fn momenta_move(&self) -> bool {
         let momenta = self
             .entries
@@ -202,7 +203,7 @@ impl Derivation {
     }
 }
 
-/// The places where some way of writing is zero: the others are zero there, too, but for rounding errors.
+/// The places where one of the ways gives zero: the others give zero there as well, except for rounding errors.
 fn vanishing(graph: &Graph, written: &[Vec<Entry>]) -> SortedSet<Place> {
     let is_zero = |value: ExprId| graph.as_constant(value).is_some_and(Constant::is_zero);
     let all = written.iter().flatten();
@@ -262,7 +263,7 @@ impl Deriver<'_> {
         }
     }
 
-    /// Derivatives of a body without sums: each pair of slots once.
+    /// Derivatives of a body without sums, each pair of slots once.
     fn plain_energy(&mut self, nest: &[SumRange], body: ExprId) {
         let slots = self.slots(body);
         let leaves: Vec<ExprId> = slots.iter().map(|(_, leaf)| *leaf).collect();
@@ -355,7 +356,7 @@ impl Deriver<'_> {
         }
     }
 
-    /// The slots of a body and their leaves, not those inside of its sums.
+    /// The slots of a body and their leaves, except those inside its sums.
     fn slots(&mut self, body: ExprId) -> Vec<(Slot, ExprId)> {
         let slot = |id: ExprId| match self.graph.node(id) {
             Node::Input(Input::Coordinate(index)) => Some((Slot::Q(index.clone()), id)),
@@ -380,7 +381,8 @@ impl Deriver<'_> {
     /// First derivatives of an expression inside a nest of loops, by all slots, also through its sums.
     fn contributions(&mut self, nest: &[SumRange], expression: ExprId) -> Vec<Contribution> {
         let mut done = Vec::new();
-        // (nest, weight, expression): the derivatives of the expression times the weight are still to come.
+        // A list of (nest, weight, expression): derivatives of the expression, to be multiplied by the weight, that
+        // remain to be taken.
         let one = self.graph.constant(Constant::ONE);
         let mut waiting = vec![(nest.to_vec(), one, expression)];
         while let Some((nest, weight, expression)) = waiting.pop() {
@@ -422,7 +424,7 @@ impl Deriver<'_> {
     fn terms(&mut self, nest: &[SumRange], expression: ExprId) -> Vec<Term> {
         let mut bodies = Bodies::new();
         let mut waiting = vec![(nest.to_vec(), Constant::ONE, expression)];
-        // Level by level: what several paths lead to is opened once, for the sum of their factors.
+        // Level by level, so that an expression reached by several paths is opened once, with the sum of their factors.
         while !waiting.is_empty() {
             for (nest, factor, id) in std::mem::take(&mut waiting) {
                 self.open(nest, factor, id, (&mut bodies, &mut waiting));
@@ -439,7 +441,7 @@ impl Deriver<'_> {
         terms
     }
 
-    /// Opens a sum, a loop, or a product that is linear in one of them, into parts that wait; anything else is a body.
+    /// Opens a sum, a loop, or a product that is linear in one of them, into further parts; anything else is a body.
     fn open(
         &mut self,
         nest: Vec<SumRange>,
@@ -544,7 +546,7 @@ type Bodies = SortedMap<Vec<SumRange>, Vec<(Constant, ExprId)>>;
 /// A part of an expression inside loops, and its factor.
 type Part = (Vec<SumRange>, Constant, ExprId);
 
-/// Parts that are the same with one factor, in the order of the first of each.
+/// Combines equal parts into one with the sum of their factors, in the order of first occurrence.
 fn merged(parts: Vec<Part>) -> Vec<Part> {
     let mut places: SortedMap<(Vec<SumRange>, ExprId), usize> = SortedMap::new();
     let mut merged: Vec<Part> = Vec::with_capacity(parts.len());

@@ -1,4 +1,4 @@
-//! Entries of results: what is added where, on every turn of which loops.
+//! Entries of results: an expression, the place to which it is added, and the loops around it.
 
 use crate::expr::graph::{ExprId, SumRange};
 use crate::program::Place;

@@ -1,4 +1,4 @@
-//! Derivatives where they are zero times infinity or zero over zero, and have a limit.
+//! Limits of derivatives where their formulas are zero times infinity or zero over zero.
 //!
 //! ```text
 //! m = max(x, 0)        ∂²(m √m)/∂x² = 3/(4 √m) { 1  where x ≥ 0;  0  elsewhere }  →  { 3/(4 √m)  where x ≥ 0;  0  elsewhere }
@@ -6,9 +6,9 @@
 //! xⁿ                   ∂xⁿ/∂x = n xⁿ⁻¹                                            →  { 0  where n = 0;  n xⁿ⁻¹  elsewhere }
 //! ```
 //!
-//! Of a product with a choice between something and zero, what may be infinite goes inside of the choice. Norms are told in `norms.rs`. A whole exponent
-//! is an index, as in `sum(i in 0..N, a[i]*x^i)`, or a length. All is done to the entries at last: before, factors have met, so that m/√m is √m and
-//! nothing has to be chosen.
+//! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
+//! are treated in `norms.rs`. A whole exponent is an index, as in `sum(i in 0..N, a[i]*x^i)`, or a length. This is done
+//! to the entries as a last step, after factors have been combined, so that m/√m is √m and no choice is needed.
 
 mod norms;
 
@@ -22,10 +22,10 @@ use crate::expr::rewrite::Mapping;
 use crate::program::Array;
 use norms::Norms;
 
-/// Factors are looked into to this depth for what may be infinite.
+/// The depth to which factors are searched for values that may be infinite.
 const MAX_DEPTH: usize = 4;
 
-/// Writes derivatives and forces so that they have their limits; products without one stay as they are.
+/// Rewrites derivatives and forces so that they have their limits; products without a limit are unchanged.
 pub(crate) fn take_limits<'a>(
     graph: &mut Graph,
     lists: impl IntoIterator<Item = &'a mut Vec<Entry>>,
@@ -74,13 +74,13 @@ fn is_slope(array: Array) -> bool {
     )
 }
 
-/// A choice between something and zero.
+/// A choice between a value and zero.
 #[derive(Clone, Copy)]
 struct OrZero {
     comparison: Comparison,
     left: ExprId,
     right: ExprId,
-    /// Whether the something is taken where the condition holds.
+    /// Whether the value is taken where the condition holds.
     holds: bool,
     value: ExprId,
 }
@@ -118,7 +118,7 @@ impl OrZero {
         key(self) == key(other)
     }
 
-    /// The choice between something else and zero.
+    /// The choice between another value and zero.
     fn with(&self, graph: &mut Graph, value: ExprId) -> ExprId {
         let zero = graph.constant(Constant::ZERO);
         let (then, otherwise) = match self.holds {
@@ -128,7 +128,7 @@ impl OrZero {
         graph.select(self.comparison, self.left, self.right, then, otherwise)
     }
 
-    /// Whether the condition and an expression hold a leaf in common.
+    /// Whether the condition and an expression have a leaf in common.
     fn concerns(&self, graph: &Graph, x: ExprId) -> bool {
         let leaves = graph.inputs_of(x);
         let mut held = [self.left, self.right]
@@ -138,7 +138,8 @@ impl OrZero {
     }
 }
 
-/// A product with what may be infinite inside of its choices. Recursion is as deep as there are choices in it.
+/// A product with factors that may be infinite moved into its choices. The recursion is as deep as the number of
+/// choices in it.
 fn inside_choices(graph: &mut Graph, x: ExprId) -> ExprId {
     let (coefficient, product) = graph.as_multiple(x);
     let Node::Product(factors) = graph.node(product) else {
@@ -174,7 +175,8 @@ fn inside_choices(graph: &mut Graph, x: ExprId) -> ExprId {
     x
 }
 
-/// A product with zero in place of n (n − 1) … xⁿ⁻ᵏ where its whole numbers vanish: with a negative exponent the power is infinite at zero.
+/// A product with zero in place of n (n − 1) … xⁿ⁻ᵏ where its integer factors vanish: with a negative exponent the
+/// power is infinite at zero.
 fn where_exponents_vanish(graph: &mut Graph, x: ExprId) -> ExprId {
     let (coefficient, product) = graph.as_multiple(x);
     let Node::Product(factors) = graph.node(product) else {
@@ -217,7 +219,7 @@ fn where_exponents_vanish(graph: &mut Graph, x: ExprId) -> ExprId {
     graph.product(coefficient, &others)
 }
 
-/// Whether it is made of indices and lengths.
+/// Whether an expression consists of indices and lengths.
 fn is_whole(graph: &Graph, x: ExprId) -> bool {
     let inputs = graph.inputs_of(x);
     !inputs.is_empty() && (inputs.iter()).all(|input| matches!(input, Input::Integer(_)))
@@ -278,7 +280,7 @@ fn may_be_infinite(graph: &Graph, x: ExprId, n: i32, depth: usize) -> bool {
     }
 }
 
-/// Whether it is a positive number, or the sum of one and of others without a minus, as 1 + x².
+/// Whether it is a positive number, or a sum of a positive number and non-negative terms, as 1 + x².
 fn is_surely_positive(graph: &Graph, x: ExprId) -> bool {
     let is_positive = |c: Constant| !c.is_zero() && !c.is_negative();
     if let Some(number) = graph.as_constant(x) {

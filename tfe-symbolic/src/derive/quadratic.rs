@@ -1,16 +1,16 @@
-//! Energies quadratic in velocities or momenta, by their matrix.
+//! Energies that are quadratic in velocities or momenta, in terms of their matrix.
 //!
 //! ```text
 //! E = uᵀ M u / 2 + bᵀ u + U        u = A z        M, b, U: of q and t alone        A: numbers
 //! E_u = M u + b        E_z = Aᵀ E_u        E_zz = Aᵀ M A        E_q = uᵀ M_q u / 2 + b_qᵀ u + U_q
 //! ```
 //!
-//! An energy declared by positions, or by angular velocities about axes that turn, leads to first derivatives that do not share their factors
-//! with the second ones: that E_z is E_zz z cannot be seen from the products. Written by M, b and U, all derivatives are made of the same few
-//! expressions. Which form costs less is decided where programs are made.
+//! For an energy declared by positions, or by angular velocities about moving axes, the first derivatives do not share
+//! factors with the second ones: from the products alone it cannot be seen that E_z is E_zz z. In terms of M, b and U,
+//! all derivatives consist of the same few expressions. Which form is cheaper is decided when programs are made.
 //!
-//! The *rates* u are z, or z and the sums of velocities that stand in the energy: in m (v₁ + v₂)²/2, m v₁ + m v₂ would lose the digits that
-//! v₁ + v₂ has where both are nearly opposite.
+//! The *rates* u are z, or z and the sums of velocities that appear in the energy: in m (v₁ + v₂)²/2, m v₁ + m v₂ would
+//! lose the digits that v₁ + v₂ has where both are nearly opposite.
 
 use crate::derive::entry::Entry;
 use crate::derive::sweep::Sweep;
@@ -25,11 +25,11 @@ use crate::expr::sorting::sort;
 use crate::optimise::estimate::{estimate, is_worth_following};
 use crate::program::{Array, Place};
 
-/// What the energy is quadratic in: a velocity or momentum, or a sum of them.
+/// A variable in which the energy is quadratic: a velocity or momentum, or a sum of them.
 #[derive(Clone)]
 struct Rate {
     value: ExprId,
-    /// What stands for it while derivatives are taken.
+    /// The leaf that represents it while derivatives are taken.
     leaf: ExprId,
     /// ∂value/∂z
     shares: SortedMap<Affine, Constant>,
@@ -38,13 +38,13 @@ struct Rate {
 /// M, b, U and u.
 struct Parts {
     rates: Vec<Rate>,
-    /// Of the upper triangle, where it is not zero.
+    /// The non-zero entries of the upper triangle.
     mass: SortedMap<(usize, usize), ExprId>,
     linear: Vec<ExprId>,
     rest: ExprId,
 }
 
-/// Entries of M, b and U are multiplied out to so many terms.
+/// Entries of M, b and U are multiplied out to at most this number of terms.
 const MAX_TERMS: usize = 64;
 
 /// How M, b and U are written.
@@ -52,12 +52,12 @@ const MAX_TERMS: usize = 64;
 enum Writing {
     /// As they follow from the energy.
     AsDerived,
-    /// Multiplied out: squares of sines and cosines meet.
+    /// Multiplied out, so that squares of sines and cosines combine.
     Expanded,
 }
 
-/// The derivatives of the energy by M, b and U in place of those among the entries, in the ways that may cost less; none if the energy is not
-/// quadratic or sums over ranges.
+/// The derivatives of the energy by M, b and U, to replace those among the entries, in the ways that may be cheaper;
+/// none if the energy is not quadratic or sums over ranges.
 pub(crate) fn entries(graph: &mut Graph, energy: ExprId, entries: &[Entry]) -> Vec<Vec<Entry>> {
     let mut places: SortedSet<&Place> = SortedSet::new();
     for entry in entries.iter().filter(|entry| is_derivative(&entry.place)) {
@@ -125,7 +125,7 @@ fn velocities(graph: &Graph, energy: ExprId) -> Vec<Rate> {
     found.into_iter().map(rate).collect()
 }
 
-/// The sums of velocities, or of momenta, in an energy, each with a leaf that stands for it.
+/// The sums of velocities, or of momenta, in an energy, each with a leaf that represents it.
 fn sums_of_velocities(graph: &mut Graph, energy: ExprId) -> Vec<Rate> {
     let mut found: Vec<(ExprId, SortedMap<Affine, Constant>)> = Vec::new();
     for id in graph.reachable(&[energy]) {
@@ -203,7 +203,8 @@ fn at_rest(graph: &mut Graph, x: ExprId) -> ExprId {
     })
 }
 
-/// Whether z stands in sums and products only. Beside |z| or a choice, second derivatives free of z do not make the first ones linear.
+/// Whether z appears in sums and products only. With |z| or a choice, second derivatives that do not depend on z do not
+/// make the first ones linear.
 fn is_polynomial(graph: &Graph, energy: ExprId) -> bool {
     let mut moving = SortedSet::new();
     for id in graph.reachable(&[energy]) {
@@ -231,7 +232,7 @@ pub(crate) fn is_derivative(place: &Place) -> bool {
 }
 
 impl Parts {
-    /// The parts of a polynomial of the rates, if its second derivatives are free of them.
+    /// The parts of a polynomial of the rates, if its second derivatives do not depend on them.
     fn of(graph: &mut Graph, energy: ExprId, rates: Vec<Rate>) -> Option<Self> {
         let sweep = Sweep::of(graph, energy);
         let energy = with_leaves_for(graph, energy, &rates);
@@ -284,7 +285,7 @@ impl Parts {
         })
     }
 
-    /// The derivatives that are asked for.
+    /// The requested derivatives.
     fn derivatives(
         &self,
         graph: &mut Graph,

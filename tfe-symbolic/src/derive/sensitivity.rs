@@ -1,12 +1,14 @@
 //! Derivatives of entries by a parameter or by the time.
 //!
-//! An element `k[2]` also stands where the body of a loop holds `k[i]`. There the derivative counts where the two are one,
+//! An element `k[2]` may also appear as `k[i]` in the body of a loop. There the derivative counts only where both are
+//! the same element,
 //!
 //! ```text
 //! ∂/∂k[2] Σᵢ f(k[i]) = Σᵢ { f′(k[i])  where i − 2 = 0;  0  elsewhere }
 //! ```
 //!
-//! as a choice and not as a product with zero or one, so that other elements at which f′ is infinite do no harm.
+//! written as a choice and not as a product with zero or one, so that other elements at which f′ is infinite do no
+//! harm.
 
 use crate::derive::entry::Entry;
 use crate::expr::comparison::Comparison;
@@ -17,7 +19,7 @@ use crate::expr::input::{Affine, Input};
 use crate::model::declared::Parameter;
 use crate::program::Array;
 
-/// What is differentiated by.
+/// The variable by which derivatives are taken.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Leaf<'a> {
     Time,
@@ -25,7 +27,7 @@ pub(crate) enum Leaf<'a> {
 }
 
 impl Leaf<'_> {
-    /// How far the index of an input is from this leaf; `None` where they are never the same.
+    /// The difference of the index of an input and that of this leaf; `None` if they can never be the same.
     fn distance(self, input: &Input) -> Option<Affine> {
         match (self, input) {
             (Self::Time, Input::Time) => Some(Affine::default()),
@@ -43,7 +45,7 @@ impl Leaf<'_> {
     }
 }
 
-/// The derivatives of the first derivatives and forces among `entries`, without those that vanish.
+/// The non-zero derivatives of the first derivatives and forces among `entries`.
 pub(crate) fn entries_by(graph: &mut Graph, entries: &[Entry], leaf: Leaf<'_>) -> Vec<Entry> {
     let first =
         |entry: &&Entry| matches!(entry.place.array, Array::ByZ | Array::ByQ | Array::Force);

@@ -1,4 +1,4 @@
-//! What is known about a model without running it.
+//! The structure of a model, found without evaluating it.
 
 use std::fmt;
 
@@ -35,13 +35,13 @@ pub struct Structure {
     pub quadratic_in_z: bool,
     /// ∂²/∂z∂z depends on parameters only.
     pub constant_mass: bool,
-    /// ∂²/∂z∂z has nothing off its diagonal.
+    /// ∂²/∂z∂z is diagonal.
     pub diagonal_mass: bool,
     /// All second derivatives and derivatives of forces depend on parameters and time only, and there are no constraints.
     pub linear: bool,
     /// ∂²/∂z∂q vanishes.
     pub separable: bool,
-    /// Nothing is chosen by a sign: no `select`, `abs`, `sign`, `min` or `max`.
+    /// There are no branches: no `select`, `abs`, `sign`, `min` or `max`.
     pub smooth: bool,
     /// ∂Q/∂q is symmetric and ∂Q/∂z vanishes: the forces have a potential at every time.
     pub symmetric_forces: bool,
@@ -49,7 +49,8 @@ pub struct Structure {
     pub cyclic: Vec<usize>,
     /// Those of them on which no force acts: their momenta are constant.
     pub conserved: Vec<usize>,
-    /// Those of them on which no force depends either: what is left of the equations does not hold them at all. None where there are constraints.
+    /// Those of them on which no force depends either, so that the other equations do not contain them. None if there
+    /// are constraints.
     pub ignorable: Vec<usize>,
     /// Pattern of ∂²/∂z∂z
     pub zz: Pattern,
@@ -63,7 +64,7 @@ pub struct Structure {
     pub force_q: Pattern,
 }
 
-/// On which leaves an expression depends.
+/// The leaves on which an expression depends.
 #[derive(Clone, Copy, Debug, Default)]
 struct Dependence {
     time: bool,
@@ -91,7 +92,7 @@ impl Dependence {
         found
     }
 
-    /// The same of what decides the choices in these expressions: conditions, and arguments of functions with a kink.
+    /// The same for what decides the choices in these expressions: conditions, and arguments of functions with a kink.
     fn of_choices(graph: &Graph, values: &[ExprId]) -> Self {
         let nodes = graph.reachable(values).into_iter();
         let deciding: Vec<ExprId> = nodes.flat_map(|id| deciding(graph.node(id))).collect();
@@ -99,7 +100,7 @@ impl Dependence {
     }
 }
 
-/// The expressions whose sign, or whose difference, chooses the value of a node.
+/// The expressions whose signs choose the value of a node.
 pub(crate) fn deciding(node: &Node) -> Vec<ExprId> {
     match node {
         Node::Select { left, right, .. } => vec![*left, *right],
@@ -112,7 +113,7 @@ pub(crate) fn deciding(node: &Node) -> Vec<ExprId> {
 }
 
 impl Structure {
-    /// Reads the structure off the derivatives.
+    /// Determines the structure from the derivatives.
     pub(crate) fn of(graph: &Graph, form: Form, dof: &Affine, entries: &[Entry]) -> Self {
         let of = |array: Array| {
             entries
@@ -126,7 +127,7 @@ impl Structure {
             wanted.map(|entry| entry.value).collect()
         };
         let depends = |arrays: &[Array]| Dependence::of(graph, &values(arrays));
-        // What a sign decides is in the first derivatives alone: those of a step are zero.
+        // Conditions appear in the first derivatives only: the derivatives of a step function are zero.
         let chosen = |arrays: &[Array]| Dependence::of_choices(graph, &values(arrays));
         let (constraints, constraints_vary) = constraints(graph, entries);
         let chosen_momenta = chosen(&[Array::ByZ]);
@@ -232,7 +233,7 @@ fn cyclic(dof: &Affine, entries: &[Entry]) -> Vec<usize> {
     without(0..count, rows)
 }
 
-/// The coordinates that are not among these indices; none where one of them is not literal.
+/// The coordinates that are not among these indices; none if one of the indices is not literal.
 fn without(
     coordinates: impl Iterator<Item = usize>,
     indices: impl Iterator<Item = Option<i64>>,
@@ -254,7 +255,8 @@ fn conserved(cyclic: &[usize], entries: &[Entry]) -> Vec<usize> {
     without(cyclic.iter().copied(), pushed)
 }
 
-/// The conserved coordinates that no first derivative, force or entry of the mass matrix holds, not even in a condition; none where one holds a coordinate whose index is not literal.
+/// The conserved coordinates on which no first derivative, force or entry of the mass matrix depends, not even in a
+/// condition; none if one depends on a coordinate whose index is not literal.
 fn ignorable(graph: &Graph, conserved: &[usize], entries: &[Entry]) -> Vec<usize> {
     let roots: Vec<ExprId> = entries
         .iter()

@@ -1,4 +1,4 @@
-//! In which direction the chain rule is followed.
+//! The direction in which the chain rule is applied: forward or backward.
 
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::{Forward, gradient};
@@ -11,16 +11,17 @@ use crate::expr::input::Input;
 /// T = m (x² + y²)/2, x = l φ̇ cos φ, y = l φ̇ sin φ        ∂T/∂φ = m (x ∂x/∂φ + y ∂y/∂φ) = m (y x − x y) = 0
 /// ```
 ///
-/// Forward, terms that cancel meet as the user would write them. Backward, each sine has its own sum of terms, in which they do not meet: fewer
-/// operations, where nothing cancels.
+/// Forward, terms that cancel are combined as a person would write them. Backward, each sine has a sum of terms of its
+/// own, in which they are not combined: this takes fewer operations where nothing cancels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sweep {
     Forward,
     Backward,
 }
 
-/// Energies of more expressions times inputs are derived backward alone: forward, each input has derivatives of all expressions of its own, and
-/// second derivatives have those of all these. The models of `benches/kernels` stay below; the largest, six planets, has 2739.
+/// If the number of expressions in an energy times that of its inputs is larger, it is differentiated backward only:
+/// forward, each input has derivatives of all expressions, and second derivatives have those of all these. The models
+/// of `benches/kernels` are below this limit; the largest, six planets, has 2739.
 const MAX_FORWARD: usize = 4000;
 
 impl Sweep {
@@ -48,7 +49,7 @@ impl Sweep {
     }
 }
 
-/// The derivative by one input, forward; what is remembered must be of the same input.
+/// The forward derivative by one input; `known` must belong to the same input.
 pub(crate) fn along(known: &mut Forward, graph: &mut Graph, of: ExprId, leaf: ExprId) -> ExprId {
     let one = graph.constant(Constant::ONE);
     let by = graph.node(leaf).clone();

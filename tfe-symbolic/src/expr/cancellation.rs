@@ -1,15 +1,17 @@
-//! Which sums may cancel without a rounding error before: they keep the order in which they are written.
+//! Sums that may cancel without an earlier rounding error: they keep the order in which they are written.
 //!
-//! The terms of most sums are rounded already, so that the sum may be taken in any order: no order is worse than the rounding of the largest
-//! term. Inputs and numbers are exact. In x − y + z with x ≈ y the difference is exact, and x + z − y would lose what z has of digits below
-//! an ulp of x. The same holds for a nested sum: (x − y) + (z − w) is not x + z − y − w.
+//! The terms of most sums have rounding errors already, so that the sum may be evaluated in any order: no order loses
+//! more than the rounding of the largest term. Inputs and constants are exact. In x − y + z with x ≈ y the difference
+//! is exact, whereas x + z − y would lose the digits of z below an ulp of x. The same holds for a nested sum: (x − y) +
+//! (z − w) is not x + z − y − w.
 
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::Input;
 
-/// Arguments of `abs`, `min`, `max` and branches of `select` are looked through to this depth; deeper ones count as rounded.
+/// The depth to which arguments of `abs`, `min`, `max` and branches of `select` are examined; deeper ones count as
+/// rounded.
 const MAX_DEPTH: usize = 8;
 
 /// What is known of the sign of an exact term.
@@ -31,8 +33,8 @@ impl Sign {
 }
 
 impl Graph {
-    /// Whether a sum has two exact terms that may have opposite signs, so that it is evaluated in the order in which it stands and is not
-    /// made part of another sum.
+    /// Whether a sum has two exact terms that may have opposite signs, so that it is evaluated in the given order and
+    /// is not merged into another sum.
     ///
     /// Parameters count as positive: sums of masses may be taken in any order.
     pub(crate) fn keeps_order(&self, id: ExprId) -> bool {
@@ -60,8 +62,8 @@ impl Graph {
                 .any(|sign| *sign == Sign::Any || *sign != signs[0])
     }
 
-    /// The group of a term in a sum that keeps its order: terms of one group are added first. Coordinates are near coordinates, and parameters near
-    /// parameters: their sums cancel before a digit is rounded away.
+    /// The group of a term in a sum that keeps its order: the terms of one group are added first. Coordinates are near
+    /// coordinates, and parameters near parameters: their sums cancel before digits are rounded away.
     pub(crate) fn group_of_term(&self, id: ExprId) -> usize {
         match self.node(id) {
             Node::Input(Input::Parameter(_) | Input::ParameterElement(..)) => 2,
@@ -71,7 +73,7 @@ impl Graph {
         }
     }
 
-    /// The sign of an expression without a rounding error; nothing where it has one.
+    /// The sign of an expression without a rounding error; `None` where it has one.
     fn sign_if_exact(&self, id: ExprId, depth: usize) -> Option<Sign> {
         let depth = depth.checked_sub(1)?;
         match self.node(id) {

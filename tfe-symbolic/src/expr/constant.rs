@@ -1,6 +1,7 @@
-//! Numbers known while deriving: exact rationals while they fit, else `f64`.
+//! Constants known during the derivation: exact rationals while they fit, otherwise `f64`.
 //!
-//! `1/2` is one half and `1e-3` is one thousandth until a program is scheduled; only then is each number rounded, once.
+//! `1/2` is one half and `1e-3` is one thousandth until a program is scheduled; only then is each constant rounded,
+//! once.
 
 use std::fmt;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -90,7 +91,7 @@ impl Constant {
                 denominator,
             } => {
                 if numerator.abs() <= EXACT && denominator <= EXACT {
-                    // One rounding, in the division: both are exact.
+                    // Both are exact, so that only the division rounds.
                     numerator as f64 / denominator as f64
                 } else {
                     let size = quotient(numerator.unsigned_abs(), denominator.unsigned_abs());

@@ -1,6 +1,7 @@
 //! Derivatives over the arena, forward along one direction and backward to all leaves at once.
 //!
-//! Both walk with an explicit stack or a forward loop and remember what they have met, so a shared node is differentiated once.
+//! Both use an explicit stack or a forward loop and remember the nodes that they have visited, so that a shared node is
+//! differentiated once.
 
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
@@ -72,7 +73,7 @@ impl Forward {
         self.0.get(&id).copied().flatten()
     }
 
-    /// The derivative of a node whose children are done; `None` is zero.
+    /// The derivative of a node whose children are done; `None` stands for zero.
     fn rate(&self, graph: &mut Graph, id: ExprId, node: &Node) -> Option<ExprId> {
         match node {
             Node::Select {
@@ -132,12 +133,12 @@ impl Forward {
 
 /// Derivatives of an expression by some of its nodes, in one backward sweep. Sums over ranges are not entered: they count as leaves.
 ///
-/// Choices are entered forward: what is chosen is a derivative of one branch. An adjoint that is zero in the other branch would be multiplied with
-/// its derivatives, and these may be infinite.
+/// Choices are differentiated forward: the derivative of a choice is the derivative of one branch. In a backward sweep,
+/// the adjoint of the other branch is zero and would be multiplied by its derivatives, which may be infinite.
 pub(crate) fn gradient(graph: &mut Graph, of: ExprId, by: &[ExprId]) -> Vec<ExprId> {
     let order = graph.reachable_outside_sums(&[of]);
     let mut results: Map<ExprId, ExprId> = Map::default();
-    // What depends on no wanted node needs no adjoint.
+    // A node that depends on no requested node needs no adjoint.
     let mut active: Set<ExprId> = by.iter().copied().collect();
     for id in &order {
         if outside_sums(graph.node(*id))
@@ -201,7 +202,7 @@ fn chooses(node: &Node) -> bool {
 fn through_choices(graph: &mut Graph, choices: &[(ExprId, ExprId)], leaf: ExprId) -> ExprId {
     let one = graph.constant(Constant::ONE);
     let mut known = Forward::default();
-    // A leaf may be a sum over a range; what is inside of other sums counts nowhere.
+    // A leaf may be a sum over a range; nodes inside other sums do not count.
     let ids: Vec<ExprId> = choices.iter().map(|(_, choice)| *choice).collect();
     for id in graph.reachable_outside_sums(&ids) {
         if matches!(graph.node(id), Node::Loop { .. }) {
@@ -225,7 +226,7 @@ fn outside_sums(node: &Node) -> Vec<ExprId> {
     }
 }
 
-/// c and s with ∂node/∂child = c s, for the child of this number.
+/// c and s with ∂node/∂child = c s, for the child with this index.
 fn partial(graph: &mut Graph, id: ExprId, node: &Node, at: usize) -> (Constant, ExprId) {
     let one = graph.constant(Constant::ONE);
     let slope = match node {

@@ -1,4 +1,4 @@
-//! What factors of a product do to each other: roots, powers, absolute values and signs.
+//! Simplification of products whose factors are roots, powers, absolute values and signs.
 
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
@@ -7,7 +7,8 @@ use crate::expr::input::Input;
 use crate::expr::ordered::SortedMap;
 
 impl Graph {
-    /// √x^(2n) → xⁿ, xⁿ/√x → xⁿ⁻¹ √x, abs(x)^(2n) → x^(2n), x sign x → abs x and xᵉ/xⁿ → xᵉ⁻ⁿ; the number by which all is to be multiplied then.
+    /// √x^(2n) → xⁿ, xⁿ/√x → xⁿ⁻¹ √x, abs(x)^(2n) → x^(2n), x sign x → abs x and xᵉ/xⁿ → xᵉ⁻ⁿ; returns the constant by
+    /// which the product is to be multiplied.
     pub(super) fn fold_powers(
         &mut self,
         collected: &mut SortedMap<ExprId, i64>,
@@ -45,8 +46,8 @@ impl Graph {
         coefficient
     }
 
-    /// xⁿ/√x → xⁿ⁻¹ √x for n > 0, x²/√abs(x) → abs(x) √abs(x) and x²/√(c x y) → x √(c x y)/(c y): the same numbers, and zero instead of 0/0 where x = 0. The number by which
-    /// all is to be multiplied then.
+    /// xⁿ/√x → xⁿ⁻¹ √x for n > 0, x²/√abs(x) → abs(x) √abs(x) and x²/√(c x y) → x √(c x y)/(c y): equal values, and
+    /// zero instead of 0/0 where x = 0. Returns the constant by which the product is to be multiplied.
     fn lift_roots(&self, collected: &mut SortedMap<ExprId, i64>) -> Constant {
         let mut coefficient = Constant::ONE;
         let below = |(x, n): &(ExprId, i64)| match self.node(*x) {
@@ -89,7 +90,8 @@ impl Graph {
         coefficient
     }
 
-    /// x sign x → abs x and abs(x) sign x → x, and even powers of a sign beside them, or beside abs(x)ᵉ, → 1. Whether there was one.
+    /// x sign x → abs x and abs(x) sign x → x; even powers of a sign beside them, or beside abs(x)ᵉ, → 1. Returns
+    /// whether there was such a factor.
     fn fold_signs(&mut self, collected: &mut SortedMap<ExprId, i64>) -> bool {
         let sign_of = |(x, n): &(ExprId, i64)| match self.node(*x) {
             Node::Call {
@@ -113,7 +115,8 @@ impl Graph {
                 _ => false,
             };
             if n > 1 && beside.is_none() && collected.iter().any(is_power) {
-                // One also where x = 0: abs(x)ᵉ sign² is the second derivative of a power of which the limit is meant.
+                // The square of a sign is one also where x = 0: abs(x)ᵉ sign² is the second derivative of a power, of
+                // which the limit is meant.
                 *collected.get_or_default(sign) = n % 2;
                 is_folded = true;
                 continue;
@@ -188,7 +191,7 @@ impl Graph {
         }
     }
 
-    /// Whether it is no parameter: these count as positive.
+    /// Whether it can be zero; parameters cannot, because they count as positive.
     fn may_vanish(&self, x: ExprId) -> bool {
         !matches!(
             self.node(x),

@@ -11,8 +11,8 @@ use crate::expr::function::Function;
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input, LoopVariable};
 
-/// The nodes that some roots are made of are put in order by going through the marks of all nodes where there are at most so many marks for each
-/// node found, which takes no longer than sorting them does; else they are sorted.
+/// If there are at most this many marks for each reachable node, reachable nodes are put in order by scanning the marks
+/// of all nodes, which takes no longer than sorting; otherwise they are sorted.
 const MARKS_PER_FOUND_NODE: usize = 32;
 
 /// An expression of a [`Graph`].
@@ -35,15 +35,16 @@ pub struct SumRange {
 pub(crate) enum Node {
     Constant(Constant),
     Input(Input),
-    /// `constant + Σ c x`: terms sorted, none constant. With several terms (counting the constant) the first coefficient is positive and
-    /// the coefficients are not all of one size other than 1; with one, it is a multiple `c x`, c ≠ 1, of what is none, unless the product of both
-    /// numbers would leave the range of `f64`.
+    /// `constant + Σ c x`: terms sorted, none of them constant. With several terms (counting the constant), the first
+    /// coefficient is positive and the coefficients are not all of equal magnitude other than 1. With one term it is a
+    /// multiple `c x`, c ≠ 1, of an x that is not a multiple, unless the product of both constants would leave the
+    /// range of `f64`.
     Sum {
         constant: Constant,
         terms: Vec<(Constant, ExprId)>,
     },
-    /// `Π x^n`: factors sorted, n ≠ 0, none a short product; a multiple only where the power of its number would leave the range of `f64`; constant
-    /// only where it is 0 to a negative power.
+    /// `Π x^n`: factors sorted, n ≠ 0, none a short product. A factor is a multiple only where the power of its
+    /// constant would leave the range of `f64`, and constant only where it is 0 to a negative power.
     Product(Vec<(ExprId, i32)>),
     Power {
         base: ExprId,
@@ -67,16 +68,16 @@ pub(crate) enum Node {
     },
 }
 
-/// What is known of a node without walking its children.
+/// Properties of a node that are kept, so that its children need not be visited.
 #[derive(Clone, Copy, Debug, Default)]
 struct Facts {
-    /// Free loop variables, one bit a depth.
+    /// Free loop variables, one bit for each depth.
     loops: u64,
     /// Whether there is a [`Node::Loop`] in it.
     contains_sum: bool,
 }
 
-/// Hash table without iteration, so that no order can come from it.
+/// A hash table without iteration, so that no order can depend on hashes.
 #[derive(Clone, Debug, Default)]
 struct Interner(Map<Node, ExprId>);
 
@@ -86,11 +87,12 @@ pub struct Graph {
     nodes: Vec<Node>,
     facts: Vec<Facts>,
     known: Interner,
-    /// Ranges whose bounds are the same on all turns of the loops around hold something: models of run-time length are checked for it.
+    /// Whether ranges whose bounds do not depend on outer loops may be assumed not to be empty: models of run-time
+    /// length are checked for that.
     pub(crate) ranges_are_checked: bool,
 }
 
-/// A sum is too long to be written out.
+/// The error that a sum is too long to be written out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooLong {
     /// The number of terms it would need.
@@ -152,7 +154,8 @@ impl Node {
     }
 }
 
-/// The bit of a loop variable in [`Graph::loops_of`]. Depths past 63 share the last bit, which only costs hoisting.
+/// The bit of a loop variable in [`Graph::loops_of`]. Depths beyond 63 share the last bit, which only prevents some
+/// hoisting.
 pub(crate) fn loop_bit(variable: LoopVariable) -> u64 {
     1 << variable.0.min(63)
 }
@@ -253,7 +256,7 @@ impl Graph {
         self.facts[id.index()].contains_sum
     }
 
-    /// The nodes that the roots are made of, children before parents, without repetition.
+    /// The nodes of which the roots consist, children before parents, without repetition.
     pub(crate) fn reachable(&self, roots: &[ExprId]) -> Vec<ExprId> {
         self.reached(roots, |_| true)
     }
@@ -263,7 +266,7 @@ impl Graph {
         self.reached(roots, |node| !matches!(node, Node::Loop { .. }))
     }
 
-    /// The nodes that the roots are made of, of some nodes only themselves.
+    /// The nodes of which the roots consist; nodes for which `is_entered` is false are included without their children.
     fn reached(&self, roots: &[ExprId], is_entered: impl Fn(&Node) -> bool) -> Vec<ExprId> {
         let mut seen = vec![false; roots.iter().map(|root| root.index() + 1).max().unwrap_or(0)];
         let mut stack = roots.to_vec();
@@ -315,7 +318,7 @@ impl Graph {
         })
     }
 
-    /// `c` and `x` with `id` = c x, where x is no multiple (but see [`Node::Sum`]).
+    /// `c` and `x` with `id` = c x, where x is not a multiple (for the exception see [`Node::Sum`]).
     pub(crate) fn as_multiple(&self, id: ExprId) -> (Constant, ExprId) {
         match self.node(id) {
             Node::Sum { constant, terms } if constant.is_zero() && terms.len() == 1 => terms[0],

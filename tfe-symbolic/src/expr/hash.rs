@@ -1,7 +1,8 @@
-//! Hash tables of small keys, which cannot be iterated over: nothing can depend on their order, so that programs are always the same.
+//! Hash tables of small keys, without iteration: nothing can depend on their order, so that programs are always the
+//! same.
 //!
-//! The engine runs inside of compilers, often not optimised itself, where the hash of the standard library, made against chosen keys, takes
-//! much of the time; here one product a word does.
+//! The engine runs inside compilers, often without optimisation. There the hash of the standard library, which resists
+//! chosen keys, takes much of the time; here one multiplication for each word suffices.
 
 use std::borrow::Borrow;
 use std::collections::hash_map::Entry;

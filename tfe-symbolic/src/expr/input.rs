@@ -41,9 +41,9 @@ pub enum Input {
     Momentum(Affine),
     /// The multiplier of the constraint of this number.
     Multiplier(Affine),
-    /// Stands for an expression while others are made, by a number and an index; kernels are given none.
+    /// A placeholder for an expression while others are made, with a number and an index; it never appears in kernels.
     Placeholder(u32, Affine),
-    /// A number given at run time, of which nothing is known but that it may change with the time.
+    /// An input, given at run time: it may change with the time, and nothing else is known about it.
     Control(String),
     /// A scalar field of the struct.
     Parameter(String),
@@ -106,7 +106,7 @@ impl Affine {
         })
     }
 
-    /// Whether it holds an entry of a list: then nothing is known of how it goes from turn to turn.
+    /// Whether it contains an entry of a list: then nothing is known about how it changes from turn to turn.
     pub fn holds_entry(&self) -> bool {
         self.entries().next().is_some()
     }
@@ -121,7 +121,7 @@ impl Affine {
         self.terms.iter().flat_map(own).collect()
     }
 
-    /// What the loop variable is multiplied by, where it stands outside of lists.
+    /// The coefficient of the loop variable outside lists.
     pub(crate) fn factor_of(&self, variable: LoopVariable) -> i64 {
         let own = self
             .terms

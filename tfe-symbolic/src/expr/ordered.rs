@@ -1,6 +1,7 @@
-//! Maps and sets in the order of their keys, as sorted vectors: in memory side by side, and far less code a type than B-trees are.
+//! Maps and sets in the order of their keys, as sorted vectors: contiguous in memory, and with much less code for each
+//! type than B-trees.
 //!
-//! Keys that come in ascending order are appended; any other moves those after it.
+//! Keys that arrive in ascending order are appended; any other insertion moves the keys after it.
 
 use std::borrow::Borrow;
 use std::ops::Index;

@@ -1,6 +1,7 @@
-//! Polynomials in full: products of sums multiplied out, so that equal ones become the same expression.
+//! Expanded polynomials: products of sums are multiplied out, so that equal polynomials become the same expression.
 //!
-//! The constructors of expressions keep nested sums, because kernels share them. Comparing two expressions wants the opposite.
+//! The constructors of expressions keep nested sums, because kernels share them. To compare two expressions, they have
+//! to be expanded.
 
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
@@ -13,7 +14,7 @@ const MOST_TERMS: usize = 512;
 type Polynomial = SortedMap<ExprId, Constant>;
 
 impl Graph {
-    /// The expression multiplied out; `None` where that makes too many terms.
+    /// The expanded expression; `None` if it has too many terms.
     ///
     /// Functions and their arguments, quotients by sums and sums over ranges are atoms.
     pub(crate) fn expanded(&mut self, root: ExprId) -> Option<ExprId> {

@@ -1,4 +1,5 @@
-//! Whole-expression rewrites: substitution of loop variables, writing sums out, opening sums that are used once.
+//! Rewrites of whole expressions: substitution of loop variables, unrolling of sums over ranges, merging of sums that
+//! are used once.
 
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node, SumRange, TooLong};
@@ -9,15 +10,16 @@ use crate::expr::sorting::sort;
 /// The most terms that [`Graph::unroll`] writes out, over all sums of an expression.
 pub(crate) const UNROLL_LIMIT: u64 = 4096;
 
-/// Terms are collected along so many paths through sums inside of sums one by one, which is faster where few are shared.
+/// Up to this number of paths through nested sums, terms are collected path by path, which is faster where few sums are
+/// shared.
 const MAX_PATHS: usize = 1 << 14;
 
-/// Old expressions and what became of those that changed; lookups only.
+/// The replacements of expressions that have changed; lookups only.
 #[derive(Default)]
 pub(crate) struct Mapping(Map<ExprId, ExprId>);
 
 impl Mapping {
-    /// What `old` became; itself if it was not touched.
+    /// The replacement of `old`; itself if it has not changed.
     pub(crate) fn of(&self, old: ExprId) -> ExprId {
         self.0.get(&old).copied().unwrap_or(old)
     }
@@ -126,7 +128,7 @@ impl Graph {
         mapping.of(id)
     }
 
-    /// What becomes of an expression and of all that it is made of where some nodes are others, children first; `None` makes a node anew of what its children became.
+    /// Rebuilds an expression, children first, with some nodes replaced; `None` rebuilds a node from its new children.
     pub(crate) fn with_nodes(
         &mut self,
         id: ExprId,
@@ -147,7 +149,7 @@ impl Graph {
         mapping
     }
 
-    /// A constant and terms that add up to the expression, sums inside of sums opened.
+    /// A constant and terms whose sum is the expression, with nested sums opened.
     pub(crate) fn terms(&self, id: ExprId) -> (Constant, Vec<(Constant, ExprId)>) {
         let mut constant = Constant::ZERO;
         let mut terms = Vec::new();
@@ -172,7 +174,8 @@ impl Graph {
         (constant, terms)
     }
 
-    /// The same where sums stand in several others, on whose paths they would be opened again and again: each is opened once, and like terms are one.
+    /// The same for sums that are shared by several others, and would be opened again on each path: each is opened
+    /// once, and like terms are combined.
     fn terms_of_shared(&self, id: ExprId) -> (Constant, Vec<(Constant, ExprId)>) {
         let mut order = Vec::new();
         let mut met: Set<ExprId> = Set::default();
@@ -233,7 +236,7 @@ impl Graph {
     pub fn unroll(&mut self, id: ExprId) -> Result<ExprId, TooLong> {
         let mut current = id;
         let mut written = 0u64;
-        // Writing out an outer sum makes the ranges of inner ones literal: one round a level of nesting.
+        // Unrolling an outer sum makes the ranges of inner ones literal: one round for each level of nesting.
         loop {
             let mut mapping = Mapping::default();
             let mut changed = false;

@@ -28,7 +28,8 @@ use crate::expr::function::{Function, Parity};
 use crate::expr::graph::{ExprId, Graph, Node, SumRange};
 use crate::expr::ordered::SortedMap;
 
-/// Products of more factors than this stay nested: opening them would make the derivative of a deep composition quadratic in its depth.
+/// Products with more factors than this stay nested: opening them would make the derivative of a deep composition
+/// quadratic in its depth.
 const LONG_PRODUCT: usize = 16;
 
 /// The largest whole exponent of a factor of a product; powers beyond it are calls of `powf`. Passes negate exponents and add
@@ -226,10 +227,10 @@ impl Graph {
         self.scale(coefficient, sum)
     }
 
-    /// c Π xᵢ^nᵢ: all rules of products are here.
+    /// c Π xᵢ^nᵢ; this function contains all rules of products.
     pub(crate) fn product(&mut self, coefficient: Constant, factors: &[(ExprId, i32)]) -> ExprId {
         let mut coefficient = coefficient;
-        // Numbers whose product with the others would leave the range of `f64`.
+        // Constants whose product with the others would leave the range of `f64`.
         let mut apart: Vec<Constant> = Vec::new();
         let mut collected: SortedMap<ExprId, i64> = SortedMap::new();
         let mut waiting: Vec<(ExprId, i64)> =

@@ -1,4 +1,5 @@
-//! Sorting, compiled once: the algorithm of the standard library is thousands of instructions long for every type and every comparison.
+//! Sorting that is compiled once: the algorithm of the standard library takes thousands of instructions for every type
+//! and every comparison.
 
 use std::cmp::Ordering;
 

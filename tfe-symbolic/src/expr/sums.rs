@@ -6,7 +6,7 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::ordered::SortedMap;
 
 impl Graph {
-    /// constant + Σ cᵢ xᵢ: all rules of sums are here.
+    /// constant + Σ cᵢ xᵢ; this function contains all rules of sums.
     pub(crate) fn linear(&mut self, constant: Constant, terms: &[(Constant, ExprId)]) -> ExprId {
         let mut sum = Collected {
             constant,
@@ -224,7 +224,7 @@ struct TermBelow {
     left: Left,
 }
 
-/// Of denominators with more terms than this some are left as they are.
+/// In denominators with more terms than this, some terms are not examined.
 const LONG_DENOMINATOR: usize = 8;
 
 /// The ways to read an expression as such a product whose partner has been made.
@@ -290,7 +290,7 @@ fn terms_below(graph: &Graph, divisor: ExprId) -> Vec<TermBelow> {
         return Vec::new();
     }
     let mut terms = terms_if_positive(graph, divisor);
-    // In several of the sums within its coefficients add up.
+    // The coefficients of a term that appears in several of the nested sums add up.
     terms.retain(|(_, term)| occurrences(graph, divisor, *term, &mut SortedMap::new()) <= 1);
     let below = |(coefficient, term): (Constant, ExprId)| TermBelow {
         coefficient,
@@ -329,7 +329,8 @@ fn terms_if_positive(graph: &Graph, sum: ExprId) -> Vec<(Constant, ExprId)> {
     found
 }
 
-/// How often an expression is a term of a sum and of the sums in it. Sums that stand in several others are counted in each, but looked into once.
+/// How often an expression is a term of a sum and of its nested sums. Sums that are shared by several others are
+/// counted in each, but examined once.
 fn occurrences(
     graph: &Graph,
     sum: ExprId,
@@ -377,7 +378,7 @@ fn without(
     rest
 }
 
-/// The factors of a product without those of one that is part of it.
+/// The quotient of a product and a product of some of its factors.
 fn quotient(factors: &[(ExprId, i32)], by: &[(ExprId, i32)]) -> Option<Vec<(ExprId, i32)>> {
     let mut rest = factors.to_vec();
     let stands = |m: i32, n: i32| if n > 0 { m >= n } else { m <= n };

@@ -1,4 +1,4 @@
-//! Indices: affine arithmetic on the syntax, and the values that an index can take.
+//! Indices: affine arithmetic on the syntax, and the range of values of an index.
 
 use super::{Index, Lowerer};
 use crate::check::Symbol;
@@ -8,7 +8,7 @@ use crate::model::declared::Extent;
 use crate::syntax::ast::{BinaryOperator, Expr, ExprKind};
 use crate::syntax::context::FieldKind;
 
-/// How many trips of a nest are looked at before an index is believed to stay inside.
+/// The number of turns of a nest of loops that are examined before an index is assumed to stay inside its array.
 const TRIPS: u64 = 20_000;
 
 impl Lowerer<'_> {
@@ -128,7 +128,7 @@ impl Lowerer<'_> {
         self.context.fields[*at].kind == FieldKind::Indices
     }
 
-    /// `left[k]`; the list is as long as its largest index asks for.
+    /// `left[k]`; the list has to be as long as its largest index requires.
     pub(super) fn entry_of_list(&mut self, list: &str, index: &Expr) -> Option<Affine> {
         self.use_symbol(&IndexSymbol::Field(list.to_owned()));
         let place = self.affine(index)?;
@@ -144,8 +144,8 @@ impl Lowerer<'_> {
         Some(Affine::symbol(IndexSymbol::Entry(list.to_owned(), place)))
     }
 
-    /// The largest or smallest value over the ranges of all indices around, as far as ranges are
-    /// independent of each other; `None` on overflow.
+    /// The largest or smallest value over the ranges of all indices in scope, as far as the ranges are independent of
+    /// each other; `None` on overflow.
     pub(super) fn extreme(&self, affine: &Affine, largest: bool) -> Option<Affine> {
         let mut value = affine.clone();
         for Index {
@@ -179,8 +179,8 @@ impl Lowerer<'_> {
         Some((low, high))
     }
 
-    /// Whether an index stays inside an array (of a length unknown here: is not negative), as far as
-    /// that can be decided; if not, reports it.
+    /// Whether an index stays inside an array (if its length is unknown here: whether it is not negative), as far as
+    /// that can be decided; if it does not, this is reported.
     pub(super) fn in_bounds(
         &mut self,
         array: &str,
@@ -188,7 +188,7 @@ impl Lowerer<'_> {
         length: Option<&Affine>,
         span: Span,
     ) -> bool {
-        // What a list holds is known at run time.
+        // The entries of a list are known only at run time.
         if place.holds_entry() {
             let length = match length {
                 Some(length) => Extent::Known(length.clone()),
@@ -228,7 +228,7 @@ impl Lowerer<'_> {
             }
             return true;
         };
-        // The extremes say it more plainly than the index itself, where they are attained.
+        // An extreme value is a clearer message than the index itself, if it is attained.
         let value = if side == Side::Above { high } else { low };
         let length = length.map(Affine::to_string);
         let array = array.to_owned();
@@ -321,11 +321,11 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The side on which an index leaves its array whatever the generic lengths are; `None` if there may be lengths for which it
-    /// stays inside. Lengths for which nothing is indexed at all say nothing.
+    /// The side on which an index leaves its array for all values of the generic lengths; `None` if there may be
+    /// lengths for which it stays inside. Lengths for which nothing is indexed at all are ignored.
     ///
-    /// An index beyond the end for small lengths and for large ones is so in between, because index and length are affine in each
-    /// length; one that changes sides may be inside for some lengths.
+    /// An index that is beyond the end for small and for large lengths is so in between, because index and length are
+    /// affine in each length; an index that changes sides may be inside for some lengths.
     fn always_outside(&self, place: &Affine, length: Option<&Affine>) -> Option<Side> {
         let needed = self.loops_around(place);
         let bounds = needed.iter().flat_map(|index| [&index.start, &index.end]);
@@ -339,7 +339,7 @@ impl Lowerer<'_> {
         let large = weights.fold(LARGE_LENGTH, u64::saturating_add);
         let of_run_time = affines.iter().any(|affine| affine.is_of_run_time());
         let looked_at = if of_run_time && !self.is_of_run_time_length() {
-            // Nothing checks lengths of such models when they run, so that usual ones have to do.
+            // The lengths of such models are not checked at run time, so that only usual ones are examined.
             USUAL_LENGTHS.map(|length| vec![length; names.len()]).into()
         } else {
             assignments(names.len(), large.min(MAX_LENGTH) as i64)
@@ -368,7 +368,7 @@ impl Lowerer<'_> {
         side
     }
 
-    /// Only the loops that have a say in an index, lest long ones beside them use up the trips.
+    /// Only the loops on which an index depends, so that long loops beside them do not use up the turns.
     fn loops_around(&self, place: &Affine) -> Vec<Index> {
         let depends = |affine: &Affine, index: &Index| affine.depends_on(index.variable);
         self.indices
@@ -392,25 +392,25 @@ enum Side {
     Above,
 }
 
-/// What the trips through a nest of loops show of an index.
+/// The result of running an index through the turns of a nest of loops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Visit {
-    /// Some trip leaves the array.
+    /// In some turn the index is outside the array.
     Outside(Side),
-    /// All trips that were looked at stay inside.
+    /// In all examined turns it is inside.
     Inside,
     /// There is no trip.
     NoTurns,
 }
 
-/// A length that counts as large where all numbers in indices are small; their sizes are added.
+/// A length that is large compared with small constants in indices; the magnitudes of these are added.
 const LARGE_LENGTH: u64 = 30;
-/// The largest length that is looked at.
+/// The largest length that is examined.
 const MAX_LENGTH: u64 = 1 << 32;
-/// All lengths in between are looked at. Arrays of one element, for which `q[2*i]` is right, are not what anyone means.
+/// All lengths in this range are examined. Arrays of one element, for which `q[2*i]` is correct, are never intended.
 const SMALL_LENGTHS: (i64, i64) = (2, 12);
 
-/// Lengths of parameters of which models with a fixed number of coordinates are believed to be used with one.
+/// Models with a fixed number of coordinates are assumed to be used with at least one of these lengths of parameters.
 const USUAL_LENGTHS: [i64; 3] = [7, 11, 22];
 
 /// The generic lengths that stand in indices, each once.
@@ -426,7 +426,8 @@ fn generic_lengths<'a>(affines: &[&'a Affine]) -> Vec<&'a str> {
     names
 }
 
-/// Lengths to look at: small ones, large ones, and such that each is in turn much larger and much smaller than the others.
+/// The lengths to be examined: small ones, large ones, and combinations in which each in turn is much larger and much
+/// smaller than the others.
 fn assignments(count: usize, large: i64) -> Vec<Vec<i64>> {
     let (least, small) = SMALL_LENGTHS;
     let equal = (least..=small).chain([large, 2 * large]);
@@ -446,7 +447,7 @@ fn assignments(count: usize, large: i64) -> Vec<Vec<i64>> {
     all
 }
 
-/// A nest of loops that is run to see where an index goes.
+/// A nest of loops that is run to find the values of an index.
 struct Nest<'a> {
     indices: &'a [Index],
     size: &'a dyn Fn(&str) -> i64,
@@ -492,7 +493,7 @@ impl Nest<'_> {
         };
         let (start, end) = (self.evaluate(&index.start), self.evaluate(&index.end));
         let mut found = Visit::NoTurns;
-        // The last and the first turn first: indices that run too far do so there.
+        // The last and the first turn come first: there, indices that run too far do so.
         let ends = [end.saturating_sub(1), start];
         let ends = ends.into_iter().filter(|_| start < end);
         for value in ends.chain((start.saturating_add(1)..end.saturating_sub(1)).rev()) {

@@ -1,4 +1,4 @@
-//! Constraints: one scalar equation a row, each told what kind it is.
+//! Constraints: one scalar equation for each row, and the kind of each.
 
 use super::{DotRule, Index, LONGEST_WRITTEN_OUT, Lowerer, Setting, Value};
 use crate::check::Symbol;
@@ -18,7 +18,7 @@ pub(super) struct Row {
     pub(super) span: Span,
 }
 
-/// What is known of the constraints before the one at hand.
+/// What is known about the preceding constraints.
 #[derive(Default)]
 struct Known {
     constraints: Vec<Constraint>,
@@ -146,7 +146,7 @@ impl Lowerer<'_> {
                 return;
             }
             let Some(kind) = kind(&mut self.graph, row) else {
-                // Parts of a family's value hold its index, which has a meaning inside only.
+                // Parts of a family's value contain its index, which has a meaning only there.
                 let part = (!family).then(|| self.not_affine_in(value)).flatten();
                 let span = part.unwrap_or(span);
                 self.report(span, Kind::ConstraintNotAffine { name: own() });
@@ -240,7 +240,7 @@ impl Lowerer<'_> {
         guilty
     }
 
-    /// Refuses solvers whose elements do not admit the constraints.
+    /// Refuses solvers whose elements cannot enforce the constraints.
     pub(super) fn check_solvers(&mut self, constraints: &[Constraint]) {
         // Solvers of a model of run-time length have been reported.
         if constraints.is_empty() || self.is_of_run_time_length() {

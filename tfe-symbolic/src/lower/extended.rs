@@ -1,4 +1,4 @@
-//! Models with the time as a coordinate, in a time τ of their own.
+//! Models with the time as a further coordinate, stepped in a time τ of their own.
 
 use crate::diagnostic::Kind;
 use crate::expr::constant::Constant;

@@ -47,7 +47,7 @@ impl Lowerer<'_> {
                 .map(|value| force(first.clone(), value))
                 .collect(),
             Some((first, Some(_))) => {
-                // The whole array; a generic one is reported as it would be in a formula.
+                // The whole array; a generic one is reported as in a formula.
                 let Value::Vector(targets) = self.value(target) else {
                     return Vec::new();
                 };

@@ -1,4 +1,4 @@
-//! Which `let`s hold rates: their meaning depends on what `dot()` means in the formula that uses them.
+//! The `let`s that contain rates: their meaning depends on that of `dot()` in the formula that uses them.
 
 use crate::check::{Model, Symbol};
 use crate::syntax::ast::{Expr, ExprKind};

@@ -80,7 +80,7 @@ impl Lowerer<'_> {
         } else if self.model.symbols.contains_key(&name) {
             Kind::UsedBeforeLet { name }
         } else if self.model.names_missing {
-            // It may be what could not be read.
+            // The name may be declared in an argument that could not be read.
             return;
         } else {
             let visible = self
@@ -228,7 +228,7 @@ impl Lowerer<'_> {
         let value = match lone {
             Some(value) => value,
             None => {
-                // On its own first, outside the loops and rules of the formula that uses it.
+                // First on its own, outside the loops and rules of the formula that uses it.
                 let setting = super::Setting {
                     linear_loops: false,
                     ..self.setting
@@ -240,13 +240,13 @@ impl Lowerer<'_> {
         };
         let depth = self.depth().0;
         if self.has_loop(&value) && (self.setting.linear_loops || depth > 0) {
-            // A loop inside other loops needs an index of its own, and the rules of the place.
+            // A loop inside other loops needs an index of its own, and the rules of that place.
             return self.named_here(at, depth);
         }
         value
     }
 
-    /// The same where it stands: its loops have indices of their own inside of so many others.
+    /// The same at the place of use: its loops have indices of their own inside this many others.
     fn named_here(&mut self, at: usize, loops: u32) -> Value {
         let key = (at, loops, self.setting);
         if let Some(value) = self.lets_here.get(&key) {

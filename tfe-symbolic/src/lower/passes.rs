@@ -186,7 +186,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// A name that nothing has.
+    /// Checks that a name is not in use.
     fn new_stiffness(&mut self, name: &str, span: Span) -> Option<()> {
         let taken = self.symbol(name).map(|symbol| Kind::NameClash {
             name: name.to_owned(),
@@ -228,7 +228,7 @@ impl Lowerer<'_> {
         })
     }
 
-    /// A value that holds nothing of the state.
+    /// A value that does not depend on the state.
     fn fixed(&mut self, pass: &'static str, value: &Expr) -> Option<ExprId> {
         let setting = Setting {
             dot: self.usual_dot,

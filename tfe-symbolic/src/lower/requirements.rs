@@ -1,5 +1,5 @@
-//! What must hold of lengths that are not known here: those of run time are checked once for each model, before it is evaluated,
-//! const parameters where the kernels are compiled for their values.
+//! Requirements on lengths that are not known here: those known at run time are checked once for each model before it
+//! is evaluated, const parameters where the kernels are compiled for their values.
 
 use super::Lowerer;
 use crate::expr::graph::SumRange;

@@ -11,7 +11,7 @@ use crate::syntax::ast::{BinaryOperator, Expr, ExprKind, Name};
 use crate::vocabulary::SPECIAL_FUNCTIONS;
 
 impl Lowerer<'_> {
-    /// `a + b - c …`: a chain leans left, and its length must not cost stack.
+    /// `a + b - c …`: a chain leans left, so that its length must not use stack.
     pub(super) fn chain(&mut self, expr: &Expr) -> Value {
         let mut steps = Vec::new();
         let mut first = expr;
@@ -112,7 +112,7 @@ impl Lowerer<'_> {
         if !(loops && self.setting.linear_loops) {
             return Some(self.graph.multiply(a, b));
         }
-        // One loop as a factor is linear still.
+        // A product with a single loop is still linear.
         match (self.written_out(a), self.written_out(b)) {
             (None, None) => {
                 self.cannot_be_written_out(&[a, b], span);
@@ -183,7 +183,7 @@ impl Lowerer<'_> {
         self.graph.inputs_of(id).iter().any(varying)
     }
 
-    /// Reports numbers that overflow when they are folded.
+    /// Reports constants that overflow when they are folded.
     pub(super) fn finite(&mut self, value: &Value, expr: &Expr) {
         let parts = match value {
             Value::Scalar(id) => std::slice::from_ref(id),
@@ -214,7 +214,7 @@ impl Lowerer<'_> {
             .or(function.map(Function::arity));
         let Some(expected) = arity else {
             self.not_a_function(&name.node, name.span);
-            // Mistakes inside are mistakes whatever stands around them.
+            // Mistakes inside are reported whatever is around them.
             for argument in arguments {
                 self.value(argument);
             }

@@ -1,6 +1,6 @@
 //! The parameters of `sensitivity(…)`: fields of type `f64` and elements of array fields.
 //!
-//! Naming a field there is no use of it: a field that no formula holds is reported as unused all the same.
+//! Naming a field here does not count as a use: a field that no formula contains is still reported as unused.
 
 use super::Lowerer;
 use crate::check::Symbol;

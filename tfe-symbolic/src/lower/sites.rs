@@ -10,7 +10,7 @@ use crate::expr::input::{Affine, IndexSymbol};
 use crate::model::declared::{Constraint, Extent, Observable};
 use crate::syntax::ast::{Expr, Name, Range};
 
-/// What is known of the constraints before the one at hand.
+/// What is known about the preceding constraints.
 #[derive(Default)]
 struct Known {
     constraints: Vec<Constraint>,
@@ -220,7 +220,8 @@ fn begins_below_zero(start: &Affine) -> bool {
     }
 }
 
-/// The number of what is declared after `first` others, by site that of the site at hand, and how many there are then.
+/// The index of what is declared after `first` others, for a declaration by site that of the present site; and their
+/// number afterwards.
 fn numbered(first: &Affine, ranges: &[SumRange]) -> Option<(Affine, Affine)> {
     match ranges.first() {
         None => Some((first.clone(), first.plus_scaled(&Affine::constant(1), 1)?)),

@@ -1,4 +1,4 @@
-//! Sums over ranges: written out where short, loops elsewhere.
+//! Sums over ranges: unrolled where they are short, loops elsewhere.
 
 use super::requirements::may_be_below_zero;
 use super::{Index, LONGEST_WRITTEN_OUT, Lowerer, SHORT_SUM, TurnByTurn, Value};
@@ -31,7 +31,7 @@ impl Lowerer<'_> {
                     .and_then(|most| most.as_constant());
                 if longest.is_some_and(|most| most <= 0) {
                     if self.indices.iter().any(|index| index.at.is_some()) {
-                        // One turn of a sum around it, on which this one is empty.
+                        // One turn of an outer sum, in which this one is empty.
                         return self.empty_sum(range);
                     }
                     let range = format!("{}..{}", range.start, range.end);
@@ -43,7 +43,7 @@ impl Lowerer<'_> {
             _ => None,
         };
         let known = bounds.0.is_some() && bounds.1.is_some();
-        // After a mistake in a bound, a range that provokes no further ones.
+        // After a mistake in a bound, a range that causes no further messages.
         let start = bounds.0.unwrap_or_default();
         let end = bounds
             .1
@@ -99,7 +99,7 @@ impl Lowerer<'_> {
             let own = pending.variables.contains(&range.variable);
             let bounds = (range.start.as_constant(), range.end.as_constant());
             let (Some(mut index), (Some(start), Some(end)), true) = (index, bounds, own) else {
-                // The sum to be written out stands further outside.
+                // The sum to be unrolled is further outside.
                 self.turn_by_turn = Some(pending);
                 return Value::Error;
             };
@@ -114,7 +114,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The least value of a bound, where that is below zero, or may be for some lengths; else zero.
+    /// The smallest value of a bound where it is negative, or may be for some lengths; otherwise zero.
     fn below_zero(&self, bound: &Affine) -> Affine {
         let least = self.extreme(bound, false).unwrap_or_default();
         match least.as_constant() {
@@ -219,7 +219,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// The expression without loops, if they are short enough to be written out.
+    /// The unrolled expression, if its loops are short enough.
     pub(super) fn written_out(&mut self, id: ExprId) -> Option<ExprId> {
         let terms = self
             .graph
@@ -243,7 +243,7 @@ impl Lowerer<'_> {
         );
     }
 
-    /// In an energy: the expression without loops, because something nonlinear is made of it.
+    /// In an energy: the expression without loops, because it is used nonlinearly.
     pub(super) fn no_loop(&mut self, id: ExprId, span: Span) -> Option<ExprId> {
         if !self.setting.linear_loops || !self.graph.contains_sum(id) {
             return Some(id);
@@ -255,7 +255,8 @@ impl Lowerer<'_> {
         written_out
     }
 
-    /// Asks the sums around for another attempt, turn by turn, where that makes the ranges of these sums literal; else reports it.
+    /// Requests another attempt in which outer sums are unrolled turn by turn, if that makes the ranges of these sums
+    /// literal; otherwise reports it.
     pub(super) fn cannot_be_written_out(&mut self, sums: &[ExprId], span: Span) {
         match self.sums_around(sums) {
             Some(variables) => {

@@ -1,4 +1,4 @@
-//! What the energy leaves out: coordinates, velocities, fields.
+//! Coordinates, velocities and fields that the energy does not contain.
 
 use super::Lowerer;
 use crate::diagnostic::{Kind, Span};
@@ -46,7 +46,7 @@ impl Lowerer<'_> {
         energy: Option<ExprId>,
         others: (&[Constraint], &[Force], Option<ExprId>),
     ) {
-        // Without an energy, which has been reported, it is too early to call anything unused.
+        // Without an energy, which has been reported, nothing can be called unused.
         if self.model.incomplete || self.model.energy.is_none() {
             return;
         }
@@ -61,7 +61,7 @@ impl Lowerer<'_> {
 
     fn check_fields(&mut self) {
         let context = self.context;
-        // A field that a misspelt name may have meant, or with another mistake, is not to blame.
+        // A field that a misspelt name may have meant, or one with another mistake, is not reported.
         let meant: Vec<String> =
             self.bag
                 .iter()
@@ -171,7 +171,7 @@ impl Lowerer<'_> {
                     .and_then(|first| usize::try_from(first).ok())
                     .unwrap_or(0)
                     + at;
-                // A constraint may determine what the Lagrangian leaves open.
+                // A constraint may determine what the Lagrangian leaves undetermined.
                 if form == Form::Lagrangian && !inputs.is_empty() && constrained.has(flat) {
                     continue;
                 }
@@ -208,14 +208,14 @@ impl Lowerer<'_> {
                     _ => continue,
                 };
                 self.report(span, kind);
-                // One message an array will do.
+                // One message for each array is enough.
                 break;
             }
         }
     }
 
-    /// The coordinates whose motion forces determine: of a Lagrangian model those that a force or the dissipation acts on, of a
-    /// Hamiltonian model also those that forces depend on.
+    /// The coordinates whose motion is determined by forces: in a Lagrangian model those on which a force or the
+    /// dissipation acts, in a Hamiltonian model also those on which forces depend.
     fn moved_by_forces(
         &self,
         form: Form,
@@ -250,7 +250,7 @@ impl Lowerer<'_> {
         self.remarks.push(remark);
     }
 
-    /// Whether ∂L/∂v of a coordinate holds no velocity, so that the mass matrix has a zero row.
+    /// Whether ∂L/∂v of a coordinate depends on no velocity, so that the mass matrix has a zero row.
     fn linear_velocity(&mut self, energy: ExprId, at: usize) -> bool {
         if self.graph.contains_sum(energy) {
             return false;

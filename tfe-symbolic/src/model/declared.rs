@@ -61,7 +61,8 @@ pub fn names(arrays: &[CoordinateArray]) -> Vec<String> {
     names
 }
 
-/// What must hold of a model of run-time length before it is evaluated; `text` and `ranges` are in the user's words.
+/// A requirement on a model of run-time length that is checked before it is evaluated; `text` and `ranges` are as the
+/// user wrote them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Requirement {
     /// An index stays inside its array on all turns of a nest of loops.
@@ -79,7 +80,7 @@ pub enum Requirement {
         /// The length of the array.
         length: Extent,
     },
-    /// A field of type `Vec<f64>` or `Vec<usize>` is exactly as long as its largest index asks for.
+    /// A field of type `Vec<f64>` or `Vec<usize>` is exactly as long as its largest index requires.
     FieldLength {
         /// The field.
         field: String,
@@ -87,10 +88,10 @@ pub enum Requirement {
         text: String,
         /// The ranges that it depends on.
         ranges: String,
-        /// The length that it must have at least; the largest of all counts.
+        /// The length that this index requires; the largest of all decides.
         length: Affine,
     },
-    /// A range holds something.
+    /// A range is not empty.
     Turns {
         /// The range, `i in 0..n-1`.
         ranges: String,
@@ -142,7 +143,8 @@ impl Force {
     }
 }
 
-/// What a motion shows beside its state; in models of run-time length one number for each site of a range.
+/// An output that a motion shows in addition to its state; in models of run-time length one number for each site of a
+/// range.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Observable {
     /// Its name as declared.
@@ -192,7 +194,7 @@ pub const CLOCK: &str = "t";
 /// Its momentum.
 pub const CLOCK_MOMENTUM: &str = "p_t";
 
-/// Steps in a time τ of their own, dt = g dτ; the model is then the extended one, with the Hamiltonian g (H + p_t).
+/// Steps in a time τ with dt = g dτ; the model is then the extended one, with the Hamiltonian g (H + p_t).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimeTransformation {
     /// H(q, p, t) as declared, with t the last coordinate; p_t = −H at the start.
@@ -261,11 +263,12 @@ pub struct Variant {
     pub made: String,
     /// The fields that the model has and the original does not, with what they are: scalars, in order.
     pub added: Vec<(String, String)>,
-    /// Where only cyclic coordinates have gone: how a state of the original gives those fields and a state of the model.
+    /// If only cyclic coordinates were removed: how a state of the original determines those fields and a state of the
+    /// model.
     pub projection: Option<Projection>,
 }
 
-/// Which coordinates and momenta of a model are left in one made from it.
+/// The coordinates and momenta of a model that remain in one made from it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Projection {
     /// How many coordinates there were.
@@ -295,7 +298,7 @@ pub struct Declared {
     pub energy: ExprId,
     /// The Rayleigh function D; Q = −∂D/∂v.
     pub dissipation: Option<ExprId>,
-    /// The time of the steps, where it is not that of the model.
+    /// The time transformation, if steps are taken in another time than that of the model.
     pub time_transformation: Option<TimeTransformation>,
     /// The generalized forces; several on one coordinate add up.
     pub forces: Vec<Force>,
@@ -315,9 +318,9 @@ pub struct Declared {
     pub crate_path: Option<String>,
     /// The fields that formulas use, in the order of the struct.
     pub used_fields: Vec<String>,
-    /// What must hold of lengths that are not known here: of run time, or const parameters.
+    /// Requirements on lengths that are not known here: lengths of run time, or const parameters.
     pub requirements: Vec<Requirement>,
-    /// What is unusual about the declaration, though no mistake: sentences with names between backticks.
+    /// Unusual properties of the declaration that are not mistakes: sentences with names between backticks.
     pub remarks: Vec<String>,
     /// The formulas as the user wrote them, in mathematical notation.
     pub notation: Notation,

@@ -65,11 +65,11 @@ fn shifted(digits: &str, zero: char) -> String {
         .collect()
 }
 
-/// How tightly a printed formula holds together.
+/// How strongly the parts of a printed formula are bound together.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Tight {
     Sum,
-    /// A product behind a minus: may begin a product, but not follow another factor.
+    /// A product with a leading minus: it may begin a product, but not follow another factor.
     Signed,
     Product,
     Atom,

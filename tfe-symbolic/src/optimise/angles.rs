@@ -1,24 +1,27 @@
-//! Sines and cosines of sums from those of their parts, where that is cheaper.
+//! Sines and cosines of sums of angles computed from those of their parts, where that is cheaper.
 //!
 //! ```text
 //! sin(a ± b) = sin a cos b ± cos a sin b        sin 2a = 2 sin a cos a
 //! cos(a ± b) = cos a cos b ∓ sin a sin b        cos 2a = 1 − 2 sin² a
 //! ```
 //!
-//! A sine with its cosine costs as much as some twenty-five products, a sum of angles four products and two sums. In a chain of n links the
-//! n(n − 1)/2 differences of angles thus follow from n pairs. Which angles are computed and which follow from others is decided over all
-//! results of a program together (`plan.rs` beside this file); the change is dropped where the arranged whole would cost more.
+//! A sine with its cosine costs as much as about twenty-five products; a sum of angles costs four products and two
+//! sums. So in a chain of n links, the n(n − 1)/2 differences of angles follow from n pairs. Which angles are computed,
+//! and which follow from others, is decided for all results of a program together (`plan.rs` beside this file); the
+//! change is dropped if the arranged program would cost more.
 //!
-//! **Where it stands.** After all derivatives are taken and before common factors are sought and operations are arranged. The derivatives
-//! themselves, the structure and the printed model know nothing of it, and the interpreter and the emitted code run the same program.
+//! **When it runs.** After all derivatives have been taken, and before common factors are extracted and operations are
+//! arranged. The derivatives, the structure and the printed model are not affected, and the interpreter and the emitted
+//! code run the same program.
 //!
-//! **What is an angle.** A sum of coordinates, parameters and the time with small whole coefficients, and of a number. Anything else
-//! (x/2, 1000 t, a product, a velocity, what varies with the index of a loop) stays as it is written. In loops there is nothing to gain: the
-//! pair of `q[j]` would be computed as often as that of `q[i] - q[j]`, for programs keep no arrays.
+//! **What counts as an angle.** A sum of coordinates, parameters and the time with small integer coefficients, and of a
+//! constant. Anything else (x/2, 1000 t, a product, a velocity, a value that varies with the index of a loop) is left
+//! unchanged. In loops nothing would be gained: the pair of `q[j]` would be computed as often as that of `q[i] - q[j]`,
+//! because programs have no arrays for intermediate results.
 //!
-//! **Rounding.** A sine from products has an absolute error of about 2⁻⁵² for each step, where the sine of a rounded difference has a
-//! relative one. Angles are known to an absolute error only, so nothing is lost that was there; but the sine of a difference of equal angles
-//! is a number of that size and need not be exactly zero.
+//! **Rounding.** A sine computed by products has an absolute error of about 2⁻⁵² for each step, whereas the sine of a
+//! rounded difference has a relative one. Angles are known only up to an absolute error, so that no significant digits
+//! are lost; but the sine of a difference of equal angles is a number of that size and need not be exactly zero.
 
 mod choice;
 #[cfg(test)]
@@ -33,10 +36,10 @@ use crate::expr::rewrite::Mapping;
 use crate::optimise::binarize::arrange;
 use choice::{Angle, Choice, How, Need, canonical, choose};
 
-/// The larger Σ |n|, the more steps; beyond this an angle is left alone.
+/// The larger Σ |n|, the more steps are needed; beyond this limit an angle is left unchanged.
 const LARGEST: u64 = 8;
 
-/// How many nodes an argument is read through.
+/// The largest number of nodes examined in an argument.
 const MOST_STEPS: usize = 24;
 
 /// The roots with sines and cosines of sums expanded where that pays.

@@ -1,7 +1,8 @@
-//! From sums and products of many operands to operations of two.
+//! Converts sums and products of many operands to operations with two operands.
 //!
-//! Decided here: what is paired with what (see `cse.rs`), powers as products, what becomes a reciprocal, where signs go. A sign travels
-//! with the value instead of costing a negation, until a sum absorbs it.
+//! It decides which operands are paired (see `cse.rs`), which powers become products, which divisors become
+//! reciprocals, and where signs go. A sign is carried along with the value until a sum absorbs it, instead of costing a
+//! negation.
 
 mod demand;
 mod family;
@@ -19,12 +20,12 @@ use demand::{Multiple, ONE, PositiveConstant, Terms, demanded, gather, multiple}
 use family::{Family, Meaning};
 use fractions::{Factors, Fractions, LARGEST_PRODUCT_POWER};
 
-/// Arranges what the roots need.
+/// Arranges all operations that the roots need.
 pub(crate) fn arrange(graph: &Graph, roots: &[ExprId]) -> Plan {
     Arranger::new(graph).run(roots)
 }
 
-/// A product over another: sets of the family of products.
+/// A quotient of two products: sets of the family of products.
 #[derive(Clone, Copy)]
 struct Quotient {
     above: Option<usize>,
@@ -37,7 +38,7 @@ struct Arranger<'a> {
     sums: Family,
     products: Family,
     sum_sets: Map<Multiple, usize>,
-    /// Sums that are evaluated in the order in which they stand.
+    /// Sums that are evaluated in the given order.
     in_order: Map<Multiple, Terms>,
     quotients: Map<Multiple, Quotient>,
     fractions: Fractions,
@@ -45,10 +46,10 @@ struct Arranger<'a> {
     built: Map<Multiple, Value>,
 }
 
-/// The products in which a divisor stands, with its exponents.
+/// The products in which a divisor appears, with its exponents.
 type Places = Vec<(Multiple, i32)>;
 
-/// Divisors of which the reciprocal is computed, each with those that always stand beside it (and itself).
+/// Divisors whose reciprocal is computed, each with those that always appear together with it (including itself).
 type SharedDivisors = SortedMap<ExprId, Vec<ExprId>>;
 
 impl<'a> Arranger<'a> {
@@ -109,14 +110,14 @@ impl<'a> Arranger<'a> {
         }
     }
 
-    /// Divisors that stand below several products, or in a loop that they do not vary in.
+    /// Divisors of several products, and divisors in a loop in which they do not vary.
     fn shared_divisors(&self, demanded: &SortedSet<Multiple>) -> SharedDivisors {
         let mut places: SortedMap<ExprId, Places> = SortedMap::new();
         let mut outside: SortedSet<ExprId> = SortedSet::new();
         for multiple in demanded {
             let (_, factors) = self.fractions.rest(self.graph, multiple);
             for (x, n) in self.roots_below(&factors) {
-                // A number below is divided by: its reciprocal may not be exact.
+                // A constant divisor stays a divisor: its reciprocal may not be exact.
                 if n < 0 && self.graph.as_constant(x).is_none() {
                     places.get_or_default(x).push((*multiple, n));
                     if self.graph.loops_of(x) != self.graph.loops_of(multiple.0) {
@@ -131,7 +132,7 @@ impl<'a> Arranger<'a> {
                     .iter()
                     .all(|(_, n)| n.unsigned_abs() <= LARGEST_PRODUCT_POWER)
         });
-        // Divisors that always stand together need one reciprocal together.
+        // Divisors that always appear together need a single reciprocal.
         let mut together: SortedMap<(Places, u64), Vec<ExprId>> = SortedMap::new();
         for (x, places) in places {
             let key = (places, self.graph.loops_of(x));
@@ -216,7 +217,7 @@ impl<'a> Arranger<'a> {
     fn collect_product(&mut self, multiple: Multiple, shared: &SharedDivisors) {
         let (x, PositiveConstant(c)) = multiple;
         let (mut above, mut below) = (Operands::new(), Operands::new());
-        // One third of something is divided by three: the product with the rounded third would round twice.
+        // A third is computed as a division by three: the product with the rounded third would round twice.
         let divisor = c
             .as_ratio()
             .filter(|(top, bottom)| *top == 1 && !is_decimal(*bottom))

@@ -1,12 +1,13 @@
-//! Results that are made in the same way, so that compilers compute two of them by one instruction.
+//! Gives similar results the same order of operations, so that compilers can compute two of them by one instruction.
 //!
 //! ```text
-//! (I v + C P) + S Q  →  I v + (C P + S Q)        where C P and S Q are made in the same way
+//! (I v + C P) + S Q  →  I v + (C P + S Q)        where C P and S Q have the same form
 //! g (b + c) + g d    →  g ((b + c) + d)          where g (b + c) is needed anyway
 //! ```
 //!
-//! In the sums that belong to coordinates like each other, terms of one kind stand beside other ones; which are added first, and which operand
-//! of a sum or product stands first, are accidents of the derivation. Here like operations are made alike, at the same cost.
+//! In sums that belong to similar coordinates, corresponding terms appear in different surroundings; which of them are
+//! added first, and which operand of a sum or product comes first, are accidents of the derivation. This pass gives
+//! similar operations the same form, at the same cost.
 
 use crate::expr::function::Function;
 use crate::expr::input::Input;
@@ -15,23 +16,23 @@ use crate::expr::sorting::{sort, sort_by_key};
 use crate::optimise::plan::{Op, OpId, Plan, Value};
 use crate::optimise::rebuild::{Changes, Formula, rebuild};
 
-/// How many levels of operands are compared of terms that are to be added first.
+/// The number of levels of operands compared to decide which terms are added first.
 const LEVELS_OF_TERMS: usize = 2;
 
 /// Functions and choices are looked through to this depth for exact terms.
 const MAX_DEPTH: usize = 8;
 
-/// How many levels of operands are compared to see which operand stands first.
+/// The number of levels of operands compared to decide which operand comes first.
 const LEVELS_OF_OPERANDS: usize = 6;
 
-/// The plan with like operations made alike.
+/// The plan with similar operations in the same form.
 pub(crate) fn with_like_operations_alike(plan: Plan) -> Plan {
     let plan = with_sums(&plan, |uses, terms| factored(&plan, uses, terms));
     let shapes = shapes(&plan, LEVELS_OF_TERMS, kind);
     with_sums(&plan, |_, terms| regrouped(&shapes, terms))
 }
 
-/// Numbers by which the operands of sums and products are put in order: the same for operations that differ in their inputs alone.
+/// Ranks by which the operands of sums and products are ordered: equal for operations that differ only in their inputs.
 pub(crate) fn ranks(plan: &Plan) -> Vec<usize> {
     shapes(plan, LEVELS_OF_OPERANDS, |op| match op {
         Op::Call(Function::Cos, _) => Kind::Cosine,
@@ -69,7 +70,8 @@ fn is_sum(op: &Op) -> bool {
     matches!(op, Op::Add(..) | Op::Subtract(..))
 }
 
-/// Whether it is read without a rounding error: an input, a number, or a size, choice or multiple of one. What nests deeper counts as rounded.
+/// Whether it has no rounding error: an input, a constant, or an absolute value, choice or multiple of one. What is
+/// nested deeper counts as rounded.
 fn is_exact(plan: &Plan, id: OpId, depth: usize) -> bool {
     let Some(depth) = depth.checked_sub(1) else {
         return false;
@@ -167,7 +169,7 @@ fn factored(plan: &Plan, uses: &[usize], terms: &[Value]) -> Option<Formula> {
     None
 }
 
-/// The sum with like terms together; nothing where there are none.
+/// The sum with similar terms grouped; `None` if there are none.
 fn regrouped(shapes: &[usize], terms: &[Value]) -> Option<Formula> {
     let mut groups: Vec<(usize, Vec<Value>)> = Vec::new();
     for term in terms {
@@ -188,7 +190,8 @@ fn regrouped(shapes: &[usize], terms: &[Value]) -> Option<Formula> {
     sums.reduce(Formula::sum)
 }
 
-/// What an operation does. Sums and differences are alike, and so are sines and cosines where nothing else is said.
+/// The kind of an operation. Sums and differences are of one kind, and so are sines and cosines unless stated
+/// otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     Constant,
@@ -233,7 +236,7 @@ fn in_one_number(kind: Kind, operands: &[usize]) -> u128 {
     number
 }
 
-/// How each operation is made of others, down to so many levels of operands: equal numbers where there is no difference.
+/// The shape of each operation, down to this number of levels of operands: equal numbers mean equal shapes.
 fn shapes(plan: &Plan, levels: usize, kind: impl Fn(&Op) -> Kind) -> Vec<usize> {
     let kinds: Vec<Kind> = plan.ids().map(|id| kind(plan.op(id))).collect();
     // Of what lies deeper, only that it is an operation.

@@ -1,7 +1,7 @@
-//! Greedy sharing in sums and products: which two operands are worth computing once.
+//! Greedy common subexpression elimination in sums and products: which two operands are worth computing once.
 //!
-//! Sums and products of many operands leave open what is added or multiplied first. The pair that saves most operations over all of them
-//! becomes an operand of its own, again and again, as long as one saves anything.
+//! In sums and products of many operands it is open which are added or multiplied first. The pair that saves most
+//! operations over all of them becomes an operand of its own, repeatedly, as long as a pair saves anything.
 
 use crate::expr::hash::Map;
 use crate::expr::ordered::SortedMap;
@@ -11,7 +11,7 @@ use std::collections::BinaryHeap;
 /// An operand: an index chosen by the caller, or of a pair made here.
 pub(crate) type Item = u32;
 
-/// What the numbers beside the operands mean.
+/// The meaning of the numbers attached to operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Signs, ±1.
@@ -31,7 +31,7 @@ pub(crate) struct Pair {
     pub(crate) sign: i32,
 }
 
-/// Longer sums and products are left alone: their pairs would be too many.
+/// Longer sums and products are left unchanged: they would have too many pairs.
 const LONGEST: usize = 400;
 
 /// Rewrites the sets so that worthwhile pairs are operands; pair number k is the operand `first_pair + k`.
@@ -140,7 +140,8 @@ impl Search {
         }
     }
 
-    /// Notes that two operands of a set are a pair, and gives it where something may be saved: now that it is in a second set, or twice in this one.
+    /// Records that two operands of a set are a pair, and returns the pair if it may now save something: because it is
+    /// in a second set, or twice in this one.
     fn note(&mut self, set: usize, first: (Item, i32), second: (Item, i32)) -> Option<Pair> {
         let ((first, a), (second, b)) = (first.min(second), first.max(second));
         let (sign, twice) = match self.kind {

@@ -1,14 +1,15 @@
-//! What results would cost if every node of their expressions were computed once, in the order in which it stands: linear in their size.
+//! An estimate of the cost of results, as if every node of their expressions were computed once in its present order;
+//! linear in their size.
 //!
-//! It tells which of several ways of writing the same results are worth the work of the passes.
+//! It tells which of several ways of writing the same results are worth running the passes on.
 
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::program::cost;
 
-/// Ways of writing that seem to cost more than so many halves of the cheapest one are not followed: on the models of `benches/kernels`, the way
-/// that ends cheapest is at most 1.4 times the one that seems cheapest.
+/// Ways of writing whose estimate is more than this many halves of the lowest one are dropped: on the models of
+/// `benches/kernels`, the way that ends up cheapest has an estimate of at most 1.4 times the lowest.
 pub(crate) const MAX_HALVES_OF_CHEAPEST: usize = 3;
 
 /// The estimated cost of results.

@@ -1,8 +1,8 @@
 //! Common factors in sums: a b + a c → a (b + c), where that makes the whole cheaper.
 //!
-//! Taking a factor out saves a product, but may cost one elsewhere that shared `a b`. So factors come out of all sums at once as long as the
-//! estimate of the whole falls, and then one by one, each kept only if the arranged whole costs less; how many are tried depends on the size, to keep
-//! compile times linear.
+//! Extracting a factor saves a product, but may cost one elsewhere that shared `a b`. So factors are first extracted
+//! from all sums at once, as long as the estimated cost of the whole decreases, and then one by one, each kept only if
+//! the arranged plan costs less. The number of trials depends on the size, to keep compile times linear.
 
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
@@ -13,11 +13,11 @@ use crate::optimise::binarize::arrange;
 use crate::optimise::estimate::estimate;
 use crate::optimise::plan::Plan;
 
-/// Operations arranged over all single trials of one kernel, in whichever ways it is written. With 50 000, 3 of 3190 operations of the models of
-/// `benches/kernels` go.
+/// The total number of operations arranged in single trials for one kernel, over all ways in which it is written. With
+/// 50 000, only 3 of 3190 operations of the models of `benches/kernels` are saved in addition.
 pub(crate) const BUDGET: usize = 20_000;
 
-/// How often factors come out of all sums at once. Nested sums take a round for each level.
+/// The number of rounds in which factors are extracted from all sums at once. Nested sums need a round for each level.
 const MAX_ROUNDS: usize = 8;
 
 /// A sum and a factor of several of its terms.
@@ -30,9 +30,9 @@ struct Candidate {
     terms: usize,
 }
 
-/// The roots with common factors taken out; no more operations than this are arranged for single trials.
+/// The roots with common factors extracted; at most this number of operations is arranged in single trials.
 ///
-/// The plan is that of the roots, given as they are and returned as they have become.
+/// The plan is that of the roots: on entry of the given ones, on return of the new ones.
 pub(crate) fn take_out_factors(
     graph: &mut Graph,
     roots: Vec<ExprId>,
@@ -55,7 +55,7 @@ pub(crate) fn take_out_factors(
             break;
         }
         roots = trial;
-        // What is left to gain is less than the next round costs.
+        // The remaining gain is less than the cost of the next round.
         if 100 * (least - cost) < least {
             break;
         }
@@ -69,7 +69,8 @@ pub(crate) fn take_out_factors(
         }
     }
     let mut budget = budget;
-    // One by one, the most promising first. What does not help is not tried again: it hardly would where the sum is the same.
+    // One by one, the most promising first. A factor that does not help is not tried again: it would hardly help where
+    // the sum is the same.
     let mut tried = SortedSet::new();
     'again: loop {
         let mut all = candidates(graph, &best.roots);

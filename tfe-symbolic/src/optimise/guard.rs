@@ -1,20 +1,25 @@
-//! What a rewritten formula may do to the digits of results: no more harm than the formula as declared, at states where digits are easily lost.
+//! The guard of digits: a rewritten formula may lose no more digits than the formula as declared, at states where
+//! digits are easily lost.
 //!
-//! The formula as declared, differentiated plainly and evaluated in the order in which it stands, is the baseline. A plan of operations that
+//! The baseline is the formula as declared, differentiated term by term and evaluated in the given order. A plan of
+//! operations that
 //! computes the same results is accepted if at each state
 //!
 //! * its results agree with those of the baseline within the rounding errors of both, so that a false identity is found out, and
 //! * the bound of its rounding error is at most [`MAX_LOSS`] times that of the baseline, or [`MAX_LOSS_WITH_ANGLES`].
 //!
-//! Operations that are exact at the numbers of a state count as such on both sides: a formula that keeps differences of close numbers until they are
-//! exact is not replaced by one that rounds first. A result that is exact as a whole may be replaced by one that is rounded.
+//! Operations that are exact for the numbers of a state count as exact on both sides: a formula that keeps differences
+//! of close numbers until they are exact is not replaced by one that rounds first. A result that is exact as a whole
+//! may be replaced by one that is rounded.
 //!
-//! **Angles.** The argument of a sine or cosine is known to half an ulp of each coordinate and parameter in it: the error of the baseline holds
-//! what such a change of the angles does. So the sine of a difference may be computed from the sines of the angles, as if these had been
-//! rounded before; a difference itself, or a power of it, may not. The cosine of equal angles counts as rounded, except at states where velocities,
-//! too, are equal or nearly so: there v − w cos(a − b) is exact, and v − w (cos a cos b + sin a sin b) is not.
+//! **Angles.** The argument of a sine or cosine is known only up to half an ulp of each coordinate and parameter in it:
+//! the error of the baseline includes the effect of such a change of the angles. So the sine of a difference may be
+//! computed from the sines of the angles, as if these had been rounded before; a difference itself, or a power of it,
+//! may not. The cosine of equal angles counts as rounded, except at states where the velocities are equal or nearly so
+//! as well: there v − w cos(a − b) is exact, and v − w (cos a cos b + sin a sin b) is not.
 //!
-//! **Choices.** Each state is judged twice where there are choices: with the branches that its numbers choose, and with the others.
+//! **Choices.** Where there are choices, each state is evaluated twice: with the branches that its numbers choose, and
+//! with the others.
 
 mod bounded;
 mod states;
@@ -30,11 +35,12 @@ use crate::optimise::plan::{Op, OpId, Plan};
 use bounded::Bounded;
 use states::{moves_together, number_of_states, state};
 
-/// How much larger than that of the baseline the bound of an error may be. A velocity times another times the cosine of a difference needs 8, where
-/// that cosine follows from those of equal angles; with 4, every chain of links would compute the sines of all differences.
+/// The largest accepted ratio of the error bound to that of the baseline. A product of two velocities and the cosine of
+/// a difference needs 8 where that cosine is computed from those of equal angles; with 4, every chain of links would
+/// compute the sines of all differences.
 const MAX_LOSS_WITH_ANGLES: f64 = 8.0;
 
-/// The same of formulas without angles.
+/// The same for formulas without angles.
 const MAX_LOSS: f64 = 4.0;
 
 /// Arguments of sines are read as angles through so many nested sums.
@@ -134,7 +140,8 @@ impl Guard {
         }
     }
 
-    /// Whether a plan computes the results well enough; `roots` are the expressions that stand for them in the plan.
+    /// Whether a plan computes the results accurately enough; `roots` are the expressions that represent them in the
+    /// plan.
     pub(crate) fn accepts(&self, plan: &Plan, roots: &[ExprId]) -> bool {
         let places: Option<Vec<(usize, bool)>> = roots
             .iter()
@@ -236,18 +243,18 @@ fn evaluate(plan: &Plan, sources: &[Source], state: &State, known: &mut [Bounded
     }
 }
 
-/// Whether a result is as good as that of the baseline; where the baseline has no value, anything is.
+/// Whether a result is as accurate as that of the baseline; where the baseline is not defined, any result is accepted.
 fn is_no_worse(found: Bounded, wanted: Bounded, max_loss: f64) -> bool {
     if !(wanted.value.is_finite() && wanted.error.is_finite()) {
         return true;
     }
     const UNIT: f64 = f64::EPSILON / 2.0;
-    // Of the bounds themselves.
+    // An allowance for rounding errors of the bounds themselves.
     const ROUNDING: f64 = 1e-9;
     // First-order bounds, and numbers below the smallest normal one.
     let apart = (found.value - wanted.value).abs();
     let near = apart <= 2.0 * UNIT * (found.error + wanted.error) + f64::MIN_POSITIVE;
-    // A result that is exact by chance is no better than a rounded one.
+    // A result that happens to be exact counts as rounded.
     let allowed = wanted.error.max(wanted.value.abs());
     near && found.error <= max_loss * (1.0 + ROUNDING) * allowed + f64::MIN_POSITIVE
 }

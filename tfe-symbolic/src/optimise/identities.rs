@@ -1,14 +1,16 @@
-//! Results from other results: what equals a sum or product of things that are computed anyway, although it was not derived that way.
+//! Computes results from other results: an operation is replaced by a sum or product of values that are computed
+//! anyway, if it is equal to it.
 //!
 //! ```text
 //! K cos²θ + C sin²θ = K + C − (K sin²θ + C cos²θ)        E_ψ = u ∂E/∂w − w ∂E/∂u where E only turns with ψ
 //! ```
 //!
-//! Derivatives of one function are full of such identities, and rules would find few of them. Here all operations are evaluated in a finite
-//! field (`residue.rs` beside this file), and for each one that costs more than a few operations by itself, a table of values shows which
-//! others it is made of. Two independent evaluations agree by accident once in 10³⁰. A change is kept if the plan costs less and rounding
-//! does not do much more harm (`guard.rs`); no operation becomes undefined where it was defined, for whatever is divided by, or is the
-//! argument of a function, was needed before as well.
+//! Derivatives of one function satisfy many such identities, of which rules would find few. Here all operations are
+//! evaluated in a finite field (`residue.rs` beside this file), and for each one that costs more than a few operations
+//! by itself, a table of values shows from which others it can be computed. Two independent evaluations agree by
+//! accident once in 10³⁰. A change is kept if the plan becomes cheaper and rounding errors do not grow much
+//! (`guard.rs`). No operation becomes undefined where it was defined, because all divisors and arguments of functions
+//! were needed before as well.
 
 mod formulas;
 mod residue;
@@ -21,13 +23,13 @@ use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::{Changes, Formula, rebuild};
 use search::{Candidate, Search, weight};
 
-/// Larger plans are left as they are.
+/// Larger plans are left unchanged.
 const LARGEST: usize = 130;
 
-/// How often all operations are looked through.
+/// The number of rounds through all operations.
 const ROUNDS: usize = 4;
 
-/// How many changes are tried in a round.
+/// The number of changes tried in a round.
 const TRIALS: usize = 32;
 
 /// The plan with operations replaced by cheaper formulas, as long as the plan is accepted.

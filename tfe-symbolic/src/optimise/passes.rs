@@ -1,11 +1,11 @@
-//! The passes: what each reads and makes, what it may cost, and what it leaves as it is.
+//! The passes: what each reads and makes, the limits of its time, and what it leaves unchanged.
 
-/// A pass of the optimiser. What a program is without it is told by [`crate::derive::derivation::Derivation::without`].
+/// A pass of the optimiser. [`crate::derive::derivation::Derivation::without`] gives programs without one of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Pass {
     /// Derivatives of an energy quadratic in z by its matrix.
     QuadraticForm,
-    /// Second derivatives on the diagonals of blocks from those off them, where forces are between pairs.
+    /// Second derivatives on the diagonals of blocks as negative sums of those off them, for forces between pairs.
     Balance,
     /// Sums used once become part of the sum that uses them.
     OpenSums,
@@ -15,13 +15,13 @@ pub enum Pass {
     ScaledTrig,
     /// a b + a c as a (b + c).
     CommonFactors,
-    /// Results from sums and products of other results.
+    /// Results as sums and products of other results.
     Identities,
-    /// Like operations made alike, so that compilers compute two by one instruction.
+    /// Similar operations in the same form, so that compilers compute two by one instruction.
     CanonicalOrder,
-    /// Differences turned round so that few results are negated.
+    /// Differences reversed so that few results are negated.
     Signs,
-    /// Statements ordered so that few values are kept at a time.
+    /// Statements ordered so that few values are live at a time.
     StatementOrder,
 }
 

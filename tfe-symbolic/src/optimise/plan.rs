@@ -1,4 +1,4 @@
-//! Operations of two operands, hash-consed: what is left to do is to put them in order.
+//! Plans: hash-consed operations with two operands, which only remain to be put in order.
 
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;

@@ -1,4 +1,5 @@
-//! Plans written anew: from the operations that their roots need, with some replaced and some differences turned round.
+//! Rebuilds plans from the operations that their roots need, with some operations replaced and some differences
+//! reversed.
 
 use crate::expr::constant::Constant;
 use crate::expr::hash::Map;
@@ -42,7 +43,7 @@ impl Formula {
 /// The changes.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Changes {
-    /// What is computed instead of these operations. No formula may need what it replaces.
+    /// The formulas that replace these operations. No formula may need what it replaces.
     pub(crate) formulas: Map<OpId, Formula>,
     /// Differences a − b that are computed as −(b − a).
     pub(crate) turned: SortedSet<OpId>,

@@ -1,9 +1,9 @@
-//! Sines and cosines together with what stands beside them: l sin θ and l cos θ as variables.
+//! Scaled sines and cosines: l sin θ and l cos θ as variables.
 //!
-//! Where θ moves an arm of length l, all expressions are made of S = l sin θ and C = l cos θ: in the products l₁ m l₂ sin θ₁ cos θ₂ the
-//! lengths need not be multiplied with each other. That is not seen from the products one by one, each of which can be put together in
-//! several ways. So S/l and C/l are put in for sine and cosine, with new inputs for S and C; where all divisors cancel, the operations are
-//! arranged with the new inputs, and these are made products afterwards.
+//! Where θ moves an arm of length l, all expressions can be written in S = l sin θ and C = l cos θ: in the products l₁
+//! m l₂ sin θ₁ cos θ₂ the lengths need not be multiplied with each other. This cannot be seen from single products,
+//! each of which can be grouped in several ways. So sine and cosine are replaced by S/l and C/l, with new inputs S and
+//! C. Where all divisors cancel, the operations are arranged with the new inputs, which are then replaced by products.
 
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
@@ -15,7 +15,7 @@ use crate::expr::rewrite::Mapping;
 use crate::optimise::plan::{Op, Plan};
 use crate::optimise::rebuild::{Changes, Formula, rebuild};
 
-/// A sine or cosine with its amplitude, and the input that stands for both.
+/// A sine or cosine with its amplitude, and the input that represents their product.
 struct Arm {
     input: Input,
     amplitude: ExprId,
@@ -25,14 +25,14 @@ struct Arm {
 /// The list of the placeholders of sines and cosines with their amplitudes.
 const SCALED: u32 = 1;
 
-/// What stands for sines and cosines in values written by arms.
+/// The inputs that represent scaled sines and cosines in the rewritten values.
 pub(crate) struct ScaledTrig(Vec<Arm>);
 
 /// Exponents of parameters, and of whatever is made of parameters alone; of sines and cosines, by their argument.
 type Powers = SortedMap<ExprId, i32>;
 
 impl ScaledTrig {
-    /// The values by arms; nothing where there are none.
+    /// The values rewritten with scaled sines and cosines; `None` if there are none.
     pub(crate) fn of(graph: &mut Graph, values: &[ExprId]) -> Option<(Self, Vec<ExprId>)> {
         if values.iter().any(|value| graph.contains_sum(*value)) {
             return None;
@@ -82,7 +82,7 @@ impl ScaledTrig {
         Some((Self(arms), values?))
     }
 
-    /// What has to be arranged along with the values.
+    /// The expressions that have to be arranged together with the values.
     pub(crate) fn parts(&self) -> impl Iterator<Item = ExprId> + '_ {
         self.0.iter().flat_map(|arm| [arm.amplitude, arm.call])
     }

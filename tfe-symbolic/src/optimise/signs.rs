@@ -1,21 +1,22 @@
-//! Which way round differences are taken, so that few results are negated.
+//! The direction of differences: a − b or b − a, so that few results are negated.
 //!
-//! A sign travels with a value until a sum absorbs it or a result has to be stored. Of a difference both signs cost the same, and with it of
-//! the products and sums that it goes into; so each is turned round where that leaves fewer negations, alone or with differences that use it.
-//! Of equal ways the one is taken in which more differences begin with what nothing else needs afterwards: that can be overwritten.
+//! A sign is carried along with a value until a sum absorbs it or a result has to be stored. Both directions of a
+//! difference cost the same, and so do the products and sums in which it is used; so each difference is reversed where
+//! that leaves fewer negations, alone or together with differences that use it. Among equal choices, the one is
+//! preferred in which more differences begin with an operand that is not needed afterwards: it can be overwritten.
 
 use crate::expr::graph::ExprId;
 use crate::expr::ordered::SortedSet;
 use crate::optimise::plan::{Op, OpId, Plan};
 use crate::optimise::rebuild::{Changes, rebuild};
 
-/// How many differences are turned together.
+/// The number of differences that are reversed together.
 const LONGEST: usize = 4;
 
-/// How many sets of them are tried, times the size of the plan.
+/// The number of sets of differences that are tried, times the size of the plan.
 const WORK: usize = 300_000;
 
-/// The plan with differences turned round; `plain`: the roots that are wanted without a sign beside them.
+/// The plan with differences reversed; `plain` are the roots that must not be negated.
 pub(crate) fn with_fewer_negations(plan: Plan, plain: &SortedSet<ExprId>) -> Plan {
     let mut signs = Signs::of(&plan, plain);
     signs.search();

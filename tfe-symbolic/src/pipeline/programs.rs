@@ -11,7 +11,7 @@ use crate::program::count::Counts;
 use crate::program::{Array, By, Place, Program, Request};
 
 impl Derivation {
-    /// The program of a kernel. It is kept, and found when it is asked for again.
+    /// The program of a kernel. It is kept, and returned again on the next request.
     pub fn program(&self, request: Request) -> Program {
         if let Some(program) = self.programs.borrow().get(&request) {
             return program.clone();

@@ -1,4 +1,5 @@
-//! From entries to a program: the same results written in several ways, of which the cheapest that loses no digits is scheduled.
+//! From entries to a program: the same results are written in several ways, and the cheapest that loses no digits is
+//! scheduled.
 
 use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
@@ -23,16 +24,18 @@ use crate::schedule::order::in_order;
 use crate::schedule::statements::schedule;
 use crate::schedule::store_or_add::settle;
 
-/// Of the drafts, those that cost at most so many fifths of the cheapest are followed: common factors and identities may change their order.
+/// Drafts that cost at most this many fifths of the cheapest are followed: common factors and identities may change
+/// their order.
 const MAX_FIFTHS_OF_CHEAPEST: usize = 6;
 
-/// Identities are sought in the cheapest plans of so many operations altogether: the search takes more than linear time.
+/// Identities are searched in the cheapest plans, of this total number of operations: the search takes more than linear
+/// time.
 const MAX_OPERATIONS_FOR_IDENTITIES: usize = 240;
 
-/// Lengths go beside their sines in drafts up to this cost.
+/// Scaled sines and cosines are tried in drafts up to this cost.
 const MAX_COST_FOR_SCALED_TRIG: usize = 300;
 
-/// Longer plans keep their order: by then registers, and not operations, are what a kernel waits for.
+/// Longer plans keep their order: in these, registers and not operations limit the speed of a kernel.
 const MAX_OPERATIONS_FOR_CANONICAL_ORDER: usize = 1000;
 
 /// A way of writing the results.
@@ -116,9 +119,11 @@ impl Draft {
         }
     }
 
-    /// The cheapest program of the same results, written in several ways, that loses no digits; of equal ones the first.
+    /// The cheapest program of the same results, written in several ways, that loses no digits; among equal ones the
+    /// first.
     ///
-    /// The first way is the one as declared: the others are compared with it, and it is taken where no other is good enough.
+    /// The first way is the formula as declared: the others are compared with it, and it is used if no other is
+    /// accurate enough.
     pub(crate) fn best(graph: &Graph, written: Vec<Vec<Entry>>, passes: Passes) -> Program {
         let mut ways: Vec<Way> = Vec::with_capacity(written.len());
         for entries in written {
@@ -156,8 +161,8 @@ impl Draft {
         best.map_or_else(Program::default, |best| best.program(&guard))
     }
 
-    /// The drafts that lose no digits and seem to cost little more than the cheapest of these; the declared one, of the first way, where no other
-    /// is left.
+    /// The drafts that lose no digits and seem to cost little more than the cheapest of these; the declared one, of the
+    /// first way, if no other remains.
     fn followed(mut declared: Self, ways: &[Way], guard: &Guard) -> Vec<Self> {
         let mut cheapest_first: Vec<(usize, &Way)> = ways.iter().enumerate().collect();
         sort_by_key(&mut cheapest_first, |(_, way)| way.estimate);
@@ -191,7 +196,7 @@ impl Draft {
         self.cleared == other.cleared && self.block.has_the_results_of(&other.block)
     }
 
-    /// Puts the operations in order, without expanded sines where these lose digits; whether none are lost.
+    /// Arranges the operations, without expanded sines if these lose digits; returns whether no digits are lost.
     fn arrange(&mut self, guard: &Guard) -> bool {
         self.plan = arrange(&self.graph, &self.values);
         if guard.accepts(&self.plan, &self.values) {
@@ -205,7 +210,8 @@ impl Draft {
         guard.accepts(&self.plan, &self.values)
     }
 
-    /// The draft with common factors taken out and, of small ones, with lengths beside their sines, where these lose no digits.
+    /// The draft with common factors extracted and, if it is small, with scaled sines and cosines, where these lose no
+    /// digits.
     fn candidates(&mut self, budget: usize, guard: &Guard) -> Vec<Candidate<'_>> {
         let mut found = Vec::with_capacity(2);
         if self.passes.run(Pass::ScaledTrig)

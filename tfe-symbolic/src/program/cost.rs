@@ -1,7 +1,7 @@
-//! The one measure of cost: what operations cost in additions.
+//! The measure of cost: the cost of each operation in additions.
 //!
-//! Rounded from timings of scalar code and of lanes, where a sine alone costs as much as a sine with its cosine. Changes of sign are free:
-//! compilers put them into the operation that follows.
+//! Rounded from timings of scalar code and of lanes, where a sine alone costs as much as a sine with its cosine.
+//! Negations are free: compilers combine them with the next operation.
 
 /// a + b, a − b
 pub(crate) const ADDITION: usize = 1;

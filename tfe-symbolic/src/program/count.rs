@@ -1,4 +1,4 @@
-//! What a program costs.
+//! Operation counts of a program.
 
 use std::fmt;
 use std::ops::Add;
@@ -7,7 +7,7 @@ use crate::expr::function::Function;
 use crate::program::cost;
 use crate::program::{Operation, Program, Statement};
 
-/// Operations by kind. What stands in a loop counts once, as it is written; stores and negations are free.
+/// Operations by kind. Operations in a loop count once; stores and negations are free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Counts {
     /// Additions and subtractions, with those onto results and running sums in loops

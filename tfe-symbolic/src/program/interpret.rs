@@ -1,4 +1,5 @@
-//! Runs a program on `f64`, with exactly the operations that the emitted code does: the oracle of the emitted code.
+//! Runs a program on `f64`, with exactly the operations of the emitted code: the interpreter is the oracle of the
+//! emitted code.
 
 use std::fmt;
 

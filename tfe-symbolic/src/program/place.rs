@@ -1,4 +1,4 @@
-//! Where results go: entries of arrays.
+//! The places of results: entries of arrays.
 
 use crate::expr::input::{Affine, LoopVariable};
 use crate::expr::rewrite::substitute;

@@ -1,4 +1,4 @@
-//! What programs are asked for.
+//! What a program is to compute.
 
 /// What one kernel computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]

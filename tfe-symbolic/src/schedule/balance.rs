@@ -1,11 +1,12 @@
-//! Pairs that feel nothing but their differences: what one of them feels is, in total, the opposite of what all others feel.
+//! Forces between pairs that depend on differences only: the total force on one body is the opposite of that on all
+//! others.
 //!
 //! ```text
 //! Σ over pairs f(x_i − x_j):        ∂²/∂x_k∂x_k = −Σ ∂²/∂x_k∂x_l over l ≠ k
 //! ```
 //!
-//! The entries off the diagonals of the blocks are written once for each pair. Those on the diagonals would be added up in memory, for both
-//! bodies of each pair; they follow from the others after the loops.
+//! The entries off the diagonals of the blocks are written once for each pair. Those on the diagonals would be
+//! accumulated in memory, for both bodies of each pair; instead they are computed from the others after the loops.
 
 use crate::derive::entry::Entry;
 use crate::expr::graph::{ExprId, Graph, SumRange};
@@ -22,7 +23,7 @@ pub(crate) struct Balance {
     pub(crate) length: Affine,
 }
 
-/// Takes out the entries that follow from others. They must be all entries of a kernel, each symmetric pair twice.
+/// Removes the entries that follow from others. `entries` must be all entries of a kernel, each symmetric pair twice.
 pub(crate) fn balances(graph: &mut Graph, entries: &mut Vec<Entry>) -> Vec<Balance> {
     let is_qq = |entry: &&Entry| entry.place.array == Array::QQ;
     let nests: Vec<&Entry> = entries.iter().filter(is_qq).collect();
@@ -109,7 +110,7 @@ impl Pairs {
         offset(&place.row).zip(offset(&place.column))
     }
 
-    /// The diagonals of all blocks of the pairs; nothing if one of them does not follow, or is written to by others.
+    /// The diagonals of all blocks of the pairs; `None` if one of them does not follow, or is written to by others.
     fn balances(&self, graph: &mut Graph, all: &[&Entry]) -> Option<Vec<Balance>> {
         let mut values: SortedMap<(Offset, Offset), ExprId> = SortedMap::new();
         let mut others = Vec::new();
@@ -155,7 +156,7 @@ impl Pairs {
                 });
             }
         }
-        // With the results of others in the blocks, nothing would vanish.
+        // If other results are added to the blocks, the sums do not vanish.
         (others.is_empty() && self.blocks_are_apart(&found)).then_some(found)
     }
 

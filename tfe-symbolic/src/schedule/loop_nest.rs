@@ -1,8 +1,8 @@
-//! The results of a program in its loops: what is written where, and what is kept in a variable meanwhile.
+//! The results of a program in nested loops: where each is written, and what is kept in variables in between.
 //!
-//! Results lie in memory, and a compiler cannot know that `E_q[i]` and `E_q[j]` are two places. So what need not go through memory on every
-//! turn is a running sum: what an inner loop adds to a place that it does not move, and, where a loop adds to the places i and i + 1, the part
-//! of i + 1 that the next turn completes.
+//! Results are in memory, and a compiler cannot know that `E_q[i]` and `E_q[j]` are two places. So values that need not
+//! go through memory on every turn become running sums: contributions of an inner loop to a place that does not depend
+//! on it, and, where a loop adds to the places i and i + 1, the part of i + 1 that the next turn completes.
 
 use crate::derive::entry::Entry;
 use crate::expr::constant::Constant;
@@ -119,7 +119,7 @@ impl Block {
         values(&mut self.after, visit);
     }
 
-    /// Whether the other one has the same results in the same loops, computed from whatever expressions.
+    /// Whether the other one has the same results in the same loops, computed from any expressions.
     pub(crate) fn has_the_results_of(&self, other: &Self) -> bool {
         let local = |(local, start): &(Local, Option<ExprId>)| (*local, start.is_some());
         let sinks = |one: &[Sink], other: &[Sink]| {
@@ -144,7 +144,7 @@ impl Block {
             && self.inner.iter().zip(&other.inner).all(inner)
     }
 
-    /// The values that are wanted as they are: what is added to a variable may as well be subtracted.
+    /// The values whose sign matters: a value that is added to a variable may as well be subtracted.
     pub(crate) fn stored(&self) -> SortedSet<ExprId> {
         let starts = self.locals.iter().filter_map(|(_, start)| *start);
         let adds = |sink: &&Sink| matches!(sink.target, Target::Add(_)) || sink.local.is_some();
@@ -204,12 +204,12 @@ impl Block {
         self.sinks.remove(at).value
     }
 
-    /// Keeps in variables what a loop adds to the places of its next turns.
+    /// Keeps contributions of a loop to the places of its next turns in variables.
     fn carry(&mut self, locals: &mut Locals, checked: bool) {
         for at in 0..self.inner.len() {
             let (range, inner) = &mut self.inner[at];
             inner.carry(locals, checked);
-            // A loop without turns would leave its variables at the places of others.
+            // If the loop had no turns, its variables would be stored at the places of others.
             let bounds = range.start.as_constant().zip(range.end.as_constant());
             let is_known = bounds.is_some_and(|(start, end)| start < end);
             let is_checked = checked && is_of_fields(&range.start) && is_of_fields(&range.end);
@@ -246,7 +246,8 @@ impl Block {
         first.map(chain).filter(|chain| chain.len() > 1).collect()
     }
 
-    /// On each turn, the first place of the chain is complete: it has what the loop adds now and what was kept of the turns before.
+    /// On each turn the first place of the chain is complete: it is the sum of the present contribution and what was
+    /// kept from earlier turns.
     fn carry_chain(&mut self, at: usize, range: &SumRange, chain: &[Place], locals: &mut Locals) {
         let kept: Vec<Local> = chain[1..].iter().map(|_| locals.next()).collect();
         let first = &chain[0];

@@ -1,8 +1,9 @@
-//! The order of statements: as soon as an operation is the last to read something, it is done.
+//! The order of statements: an operation is executed as soon as it is the last reader of some value.
 //!
-//! What it computes takes the register of what nothing else needs. So fewer values have to be kept at a time, and fewer are copied before an
-//! operation overwrites them. Of all operations whose operands are known, the one comes first that reads most values for the last time, and of
-//! equal ones the one that was first before; a result is stored at once. Sines and cosines stay where they are, with all that comes before them.
+//! Its result can take the register of a value that nothing else needs. So fewer values are live at a time, and fewer
+//! are copied before an operation overwrites them. Of all operations whose operands are known, the one that reads most
+//! values for the last time comes first, and among equal ones the one that was first before; a result is stored at
+//! once. Sines and cosines keep their places, with everything that precedes them.
 
 use std::cmp::Reverse;
 
@@ -13,7 +14,8 @@ use crate::expr::ordered::SortedSet;
 use crate::expr::sorting::sort;
 use crate::program::{Operand, Operation, Statement, Temporary};
 
-/// The same statements, where nothing else depends on their order, in one that keeps few values; temporaries are numbered as they come.
+/// The same statements in an order that keeps few values live, as far as they are independent; temporaries are numbered
+/// in the order of their definition.
 pub(crate) fn in_order(statements: Vec<Statement>) -> Vec<Statement> {
     let mut statements = ordered(statements);
     let mut numbers = Numbers::default();
@@ -21,7 +23,7 @@ pub(crate) fn in_order(statements: Vec<Statement>) -> Vec<Statement> {
     statements
 }
 
-/// What may be in a register.
+/// A value that may be in a register.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 enum Value {
     Temporary(Temporary),
@@ -63,7 +65,7 @@ fn ordered(statements: Vec<Statement>) -> Vec<Statement> {
     done
 }
 
-/// How many statements have still to read each value.
+/// The number of statements that have still to read each value.
 struct Scope {
     left: Map<Value, usize>,
 }
@@ -77,7 +79,7 @@ impl Scope {
             }
             own.extend(defines(statement));
         }
-        // What comes from outside is read again on the next turn.
+        // A value from outside the loop is read again on the next turn.
         left.retain(
             |value| !matches!(value, Value::Temporary(temporary) if !own.contains(temporary)),
         );
@@ -92,7 +94,8 @@ impl Scope {
         }
     }
 
-    /// Values that are read for the last time; more than there can be for a result, which is stored at once.
+    /// The number of values that are read for the last time; larger than any such number for a result, which is stored
+    /// at once.
     fn ends(&self, statement: &Statement, reads: &[Value]) -> usize {
         match statement {
             Statement::Store { .. } => usize::MAX,

@@ -1,4 +1,5 @@
-//! From arranged operations to a program: temporaries as they are needed, each as far outside of the loops as it can be.
+//! From arranged operations to a program: temporaries are defined as they are needed, each as far outside the loops as
+//! possible.
 
 use crate::expr::function::Function;
 use crate::expr::graph::{SumRange, loop_bit};
@@ -83,7 +84,7 @@ impl Scheduler {
         }
     }
 
-    /// Sines and cosines before all else: whatever is known across a call has to be kept in memory.
+    /// Sines and cosines come first: every value that is live across a call has to be kept in memory.
     fn angles(&mut self) {
         let angle = |id: &OpId| {
             let call = matches!(
@@ -161,7 +162,7 @@ impl Scheduler {
         }
     }
 
-    /// Subtracts from a running sum what would have to be negated to be added.
+    /// Subtracts a value from a running sum if it would otherwise have to be negated and added.
     fn take_away(&mut self, local: Local, value: Value) {
         if let Some(target) = self.local(local) {
             let value = self.onto(target, value);
@@ -173,7 +174,8 @@ impl Scheduler {
         self.locals.get(&local.0).copied()
     }
 
-    /// A variable plus a value. The sum is no operation of the plan: the variable is another number on the next turn.
+    /// A variable plus a value. The sum is not an operation of the plan, because the variable has another value on the
+    /// next turn.
     fn onto(&mut self, local: Temporary, value: Value) -> Operand {
         let (local, other) = (Operand::Temporary(local), self.operand(value.op));
         let operation = if value.negative {
@@ -280,7 +282,7 @@ impl Scheduler {
                 stack.pop();
             }
         }
-        // Known by construction; a hole in the plan shows as NaN in tests, not as a panic in a compiler.
+        // Known by construction; a gap in the plan would show as NaN in tests, not as a panic in a compiler.
         self.known(id).unwrap_or(Operand::Constant(f64::NAN))
     }
 

@@ -1,7 +1,8 @@
-//! Which results are stored, and which are added to what is there.
+//! Which results are stored, and which are added to what is already there.
 //!
-//! Who writes to a place first stores. If that is another one on other turns, zeros are stored before all else. Where loops have literal
-//! ranges, this is found out by going through their turns; elsewhere it needs a proof (`apart.rs` beside this file), or the array is cleared.
+//! The first write to a place is a store; later writes add. If the first write is another one on other turns, zeros are
+//! stored at the beginning. Where loops have literal ranges, this is found by running through their turns; elsewhere it
+//! needs a proof (`apart.rs` beside this file), or the array is cleared.
 
 mod apart;
 
@@ -13,13 +14,14 @@ use crate::program::{Array, Place};
 use crate::schedule::loop_nest::{Block, Sink, Target};
 use apart::all_apart;
 
-/// How many writes are gone through.
+/// The largest number of writes that are run through.
 const MOST_WRITES: usize = 100_000;
 
-/// An array with more places to be zeroed is cleared whole.
+/// An array with more places to be set to zero is cleared as a whole.
 const MOST_ZEROS: usize = 32;
 
-/// Decides for each result, and puts zeros in front where they are needed; the arrays that have to be cleared.
+/// Decides for each result, and inserts zeros in front where they are needed; returns the arrays that have to be
+/// cleared.
 pub(crate) fn settle(root: &mut Block, zero: ExprId) -> SortedSet<Array> {
     let mut writers = Vec::new();
     let steps = steps(root, &mut Vec::new(), &mut writers);
@@ -82,7 +84,7 @@ enum Step {
 struct Writer {
     nest: Vec<SumRange>,
     place: Place,
-    /// The places that nobody has written to before.
+    /// The places to which nothing has been written before.
     first: Vec<(i64, i64)>,
     /// Whether there are others.
     adds: bool,

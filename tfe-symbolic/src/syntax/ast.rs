@@ -1,4 +1,4 @@
-//! What the user wrote, and nothing else: the syntax tree of one `#[dynamics(...)]` attribute.
+//! The syntax tree of one `#[dynamics(...)]` attribute: what the user wrote, and nothing else.
 
 use crate::diagnostic::span::Span;
 use crate::expr::comparison::Comparison;

@@ -1,4 +1,4 @@
-//! What the macro tells the engine about the struct that carries the attribute.
+//! What the macro passes to the engine about the struct with the attribute.
 
 /// The struct: its name, fields and const parameters.
 #[derive(Clone, Debug, Default, PartialEq)]

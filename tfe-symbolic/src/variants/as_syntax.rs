@@ -1,4 +1,4 @@
-//! Expressions as syntax, so that formulas of models that nobody has written are printed like those of users.
+//! Converts expressions to syntax, so that formulas of generated models are printed like those of users.
 
 use crate::diagnostic::span::Span;
 use crate::expr::constant::Constant;

@@ -41,7 +41,7 @@ impl Reduction {
         Ok(())
     }
 
-    /// Takes the constraints of this name out; the others move up.
+    /// Removes the constraints of this name; the others move up.
     fn released(&mut self, target: &Target) -> Result<Vec<Constraint>, Kind> {
         let name = target.to_string();
         let family = format!("{name}[");

@@ -4,7 +4,7 @@
 //! q_i = e(t) ,     v_i = ∂e/∂t
 //! ```
 //!
-//! Whatever holds the coordinate there takes the forces on it.
+//! The force that holds the coordinate on this motion also takes up the forces on it.
 
 use super::target::Places;
 use super::{Assignment, Mistake, Reduction};
@@ -82,7 +82,7 @@ impl Reduction {
         })
     }
 
-    /// What is left of the constraints still constrains something.
+    /// Checks that the remaining constraints still constrain something.
     fn judge_constraints(&mut self) -> Result<(), Kind> {
         let graph = &mut self.model.graph;
         for constraint in &mut self.model.constraints {

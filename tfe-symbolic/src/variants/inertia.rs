@@ -5,7 +5,8 @@ use crate::expr::differentiate::derivative;
 use crate::expr::input::{Affine, Input};
 use crate::model::declared::{Declared, Form, names};
 
-/// The first coordinate whose momentum holds no velocity, or whose velocity no momentum; those that constraints act on do not count.
+/// The first coordinate whose momentum depends on no velocity, or whose velocity depends on no momentum; coordinates on
+/// which constraints act do not count.
 pub(super) fn missing(model: &mut Declared) -> Option<String> {
     if model.graph.holds_varying_index(model.energy) {
         return None;

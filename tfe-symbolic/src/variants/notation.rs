@@ -7,7 +7,7 @@ use crate::model::declared::{CoordinateArray, Declared, names};
 use crate::model::notation::{Notation, formula};
 use crate::syntax::ast::Expr;
 
-/// Longer formulas are for kernels only.
+/// Longer formulas are not printed.
 const READABLE: usize = 400;
 
 /// Where the model comes from, then its formulas as far as they can be read.

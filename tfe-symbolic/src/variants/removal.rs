@@ -1,4 +1,4 @@
-//! Coordinates that leave a model: the others move up.
+//! Removal of coordinates from a model: the others move up.
 
 use super::Reduction;
 use crate::diagnostic::Kind;
@@ -51,9 +51,9 @@ impl Reduction {
         })
     }
 
-    /// Takes coordinates out that no formula holds any more; indices of coordinates are numbers.
+    /// Removes coordinates that no formula contains any more; indices of coordinates are constants.
     ///
-    /// `removed` is sorted. Forces on them go, too.
+    /// `removed` is sorted. Forces on them are removed as well.
     pub(super) fn remove(&mut self, removed: &[i64], pass: &'static str) -> Result<(), Kind> {
         let shifted = |at: i64| at - removed.partition_point(|gone| *gone < at) as i64;
         let moved = |at: &Affine| {

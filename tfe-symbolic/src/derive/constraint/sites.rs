@@ -1,4 +1,5 @@
-//! Holonomic constraints by site: the equations of all sites of a range are one template, differentiated once by its slots.
+//! Holonomic constraints by site: the equations of all sites of a range are one template, which is differentiated once
+//! by its slots.
 //!
 //! ```text
 //! φ_r(q, t) = 0,   r = offset + (i − start)        A = ∂φ/∂q   a = ∂φ/∂t   Σ_r μ_r ∂²φ_r/∂q∂q
@@ -15,7 +16,7 @@ use crate::expr::input::{Affine, Input};
 use crate::model::declared::Constraint;
 use crate::program::{Array, Place};
 
-/// What of each constraint is added where, on every turn of its range.
+/// The entries of all constraint arrays, on every turn of their ranges.
 pub(crate) fn entries(graph: &mut Graph, constraints: &[Constraint]) -> Vec<Entry> {
     let mut entries = Vec::new();
     for constraint in constraints {

@@ -4,8 +4,9 @@
 //! h = √(x² + y²)       ∂(h x)/∂y = x y/h        |x y/h| ≤ h
 //! ```
 //!
-//! A product of higher degree in x and y than what it is divided by is zero where they are: 0/0 becomes 0/1 there, where the norm is replaced by one.
-//! A product of the same degree, such as the direction x/h, or of a lower one, such as the attraction x/h³, has no limit and stays as it is.
+//! A product of higher degree in x and y than its divisor is zero where they are zero: there 0/0 becomes 0/1, by
+//! replacing the norm by one. A product of the same degree, such as the direction x/h, or of a lower one, such as the
+//! attraction x/h³, has no limit and is unchanged.
 
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
@@ -14,32 +15,32 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::input::Input;
 
-/// Roots, powers and sums are looked into to this depth.
+/// The depth to which roots, powers and sums are searched.
 const MAX_DEPTH: usize = 6;
 
-/// Degrees are sums of exponents, which may be rounded.
+/// Degrees are sums of exponents, which may have rounding errors.
 const ROUNDING: f64 = 1e-6;
 
 /// √(Σ c xᵢ²) with c > 0, also of one square, or hypot(x₁, x₂).
 #[derive(Clone)]
 struct Norm {
     root: Option<ExprId>,
-    /// The argument of the root without a number in front.
+    /// The argument of the root without a constant factor.
     square: Option<ExprId>,
-    /// The same without parameters in front, if there are some.
+    /// The same without parameters as factors, if there are some.
     bare: Option<ExprId>,
-    /// Whether there is no such number.
+    /// Whether there is no constant factor.
     is_plain: bool,
-    /// The xᵢ as products, without the parameters in them.
+    /// The xᵢ as products, without the parameters among their factors.
     parts: Vec<Vec<(ExprId, i32)>>,
 }
 
-/// The norms that have been looked at; `None` is none.
+/// The expressions examined so far; `None` for those that are not norms.
 #[derive(Default)]
 pub(super) struct Norms(Map<ExprId, Option<Norm>>);
 
 impl Norms {
-    /// A product with ones in place of norms below it where it vanishes with them.
+    /// A product in which norms in the denominator are replaced by one where the product vanishes with them.
     pub(super) fn limit(&mut self, graph: &mut Graph, x: ExprId) -> ExprId {
         let mut found: Vec<Norm> = Vec::new();
         for (y, n) in factors_of(graph, x) {
@@ -84,7 +85,7 @@ fn factors_of(graph: &Graph, x: ExprId) -> Vec<(ExprId, i32)> {
     }
 }
 
-/// The root of the factors of an expression without parameters, if they have one and vanish somewhere.
+/// The root of the factors of an expression without parameters, if they have one and it can vanish.
 fn part(graph: &Graph, x: ExprId, root: i32) -> Option<Vec<(ExprId, i32)>> {
     let mut part = Vec::new();
     for (y, n) in factors_of(graph, x) {
@@ -98,7 +99,7 @@ fn part(graph: &Graph, x: ExprId, root: i32) -> Option<Vec<(ExprId, i32)>> {
     (!part.is_empty()).then_some(part)
 }
 
-/// The sum in a product of parameters with one.
+/// The sum in a product of parameters with one sum.
 fn without_parameters(graph: &Graph, square: ExprId) -> Option<ExprId> {
     let Node::Product(factors) = graph.node(square) else {
         return None;
@@ -116,7 +117,7 @@ fn without_parameters(graph: &Graph, square: ExprId) -> Option<ExprId> {
     }
 }
 
-/// One where something that is never negative is zero, and itself elsewhere.
+/// One where a non-negative expression is zero, and the expression elsewhere.
 fn one_where_zero(graph: &mut Graph, x: ExprId) -> ExprId {
     let one = graph.constant(Constant::ONE);
     elsewhere(graph, x, one)
@@ -131,7 +132,8 @@ fn one_where_root_vanishes(graph: &mut Graph, square: ExprId, exponent: ExprId) 
     elsewhere(graph, square, at_zero)
 }
 
-/// Something else where a norm or its square is zero, and itself elsewhere. What parameters make negative is no square, and stays NaN in a power.
+/// Another value where a norm or its square is zero, and the norm elsewhere. A radicand that parameters make negative
+/// is not a square, and stays NaN in a power.
 fn elsewhere(graph: &mut Graph, x: ExprId, at_zero: ExprId) -> ExprId {
     let zero = graph.constant(Constant::ZERO);
     let is_parameter =
@@ -145,7 +147,7 @@ fn elsewhere(graph: &mut Graph, x: ExprId, at_zero: ExprId) -> ExprId {
 }
 
 impl Norm {
-    /// The norm that an expression is, or is a root, a power or the square of.
+    /// The norm of which an expression is a root, a power or the square, or which it is itself.
     fn of(graph: &Graph, x: ExprId) -> Option<Self> {
         let mut x = x;
         for _ in 0..MAX_DEPTH {
@@ -236,7 +238,7 @@ impl Norm {
         }
     }
 
-    /// The least degree of the terms of an expression in the norm and its parts.
+    /// The lowest degree of the terms of an expression in the norm and its parts.
     fn degree(&self, graph: &Graph, x: ExprId, depth: usize) -> f64 {
         let Some(depth) = depth.checked_sub(1) else {
             return 0.0;
@@ -289,7 +291,7 @@ impl Norm {
         degree
     }
 
-    /// The product with ones in place of this norm where both vanish; nothing where it stays as it is.
+    /// The product with this norm replaced by one where both vanish; `None` where the product is unchanged.
     fn limit(&self, graph: &mut Graph, factors: &[(ExprId, i32)]) -> Option<ExprId> {
         let unknown = |(x, n): &(ExprId, i32)| match graph.node(*x) {
             Node::Power { base, exponent } if *n == 1 => {

@@ -1,25 +1,25 @@
-//! Which angles are computed, and which follow from others.
+//! The choice of the angles that are computed; the others follow from them.
 //!
-//! Small angles come first. Each follows from those before it if that is cheaper than to compute it, so n angles and all their differences
-//! need n pairs. Atoms that are no angle of the program themselves are tried as helpers: three angles a − b, b − c, a + b + c do not
-//! follow from each other, but from a, b, c.
+//! Small angles come first. Each follows from those before it if that is cheaper than computing it, so that n angles
+//! and all their differences need n pairs. Atoms that are not themselves angles of the program are tried as helpers:
+//! the three angles a − b, b − c, a + b + c do not follow from each other, but they do from a, b, c.
 
 use crate::expr::graph::ExprId;
 use crate::expr::ordered::SortedMap;
 use crate::expr::sorting::{sort, sort_by_key};
 use crate::program::cost;
 
-/// An angle, `Σ n x`: atoms in order, n ≠ 0, the first n positive. A number is an atom like the others.
+/// An angle, `Σ n x`: atoms in order, n ≠ 0, the first n positive. A constant is an atom like the others.
 pub(crate) type Angle = Vec<(ExprId, i64)>;
 
-/// What is wanted of an angle.
+/// The functions of an angle that are needed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Need {
     pub(super) sine: bool,
     pub(super) cosine: bool,
 }
 
-/// Where sine and cosine of an angle come from.
+/// How sine and cosine of an angle are computed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum How {
     /// From the argument.
@@ -52,10 +52,10 @@ struct Step {
     free: bool,
 }
 
-/// How many helpers are tried one by one.
+/// The number of helpers that are tried one by one.
 const MOST_TRIALS: usize = 24;
 
-/// How many known angles are tried as a part of a further one.
+/// The number of known angles that are tried as part of another one.
 const MOST_PARTS: usize = 64;
 
 const BOTH: Need = Need {
@@ -205,7 +205,7 @@ impl Choice {
         }
     }
 
-    /// Steps to an angle from what is known: parts known by themselves are split off, even angles halved, until the rest follows.
+    /// Steps to an angle from known ones: known parts are split off, even angles are halved, until the rest follows.
     fn route(&self, angle: &Angle) -> Option<Vec<(Angle, How)>> {
         let mut route = Vec::new();
         let mut rest = angle.clone();
@@ -246,8 +246,8 @@ impl Choice {
         (!route.is_empty()).then_some(route)
     }
 
-    /// The angle as a sum or difference of two that are known. An atom that is in both parts and not in the angle would bring the rounding of its
-    /// sine into that of the angle: sin a is not taken from those of a + b and b.
+    /// The angle as a sum or difference of two known ones. An atom that is in both parts but not in the angle would
+    /// contribute the rounding error of its sine to that of the angle: sin a is not computed from those of a + b and b.
     fn two_parts(&self, angle: &Angle) -> Option<How> {
         if let Some(half) = half(angle).filter(|half| self.known.contains_key(half)) {
             return Some(How::Double(half));

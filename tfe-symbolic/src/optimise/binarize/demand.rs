@@ -1,11 +1,11 @@
-//! Which multiples of expressions have to be computed, and what the terms of sums are.
+//! The multiples of expressions that have to be computed, and the terms of sums.
 
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Set;
 use crate::expr::ordered::{SortedMap, SortedSet};
 
-/// A positive multiple of an expression that is no multiple itself.
+/// A positive multiple of an expression that is itself not a multiple.
 pub(crate) type Multiple = (ExprId, PositiveConstant);
 
 /// A constant with an (arbitrary, but fixed) order in which 1 is the first.
@@ -44,7 +44,7 @@ impl Terms {
     }
 }
 
-/// c x as a positive multiple of something that is no multiple, and whether the sign was lost.
+/// c x as a positive multiple of an expression that is itself not a multiple, and whether its sign has been dropped.
 pub(super) fn multiple(graph: &Graph, c: Constant, x: ExprId) -> (Multiple, bool) {
     let (c, x) = graph.as_multiple_times(c, x);
     ((x, PositiveConstant(c.abs())), c.is_negative())

@@ -64,7 +64,8 @@ impl Family {
         item
     }
 
-    /// The set of these operands; what varies in fewer loops than the rest is grouped, so that it can be computed outside of them.
+    /// The set of these operands; those that vary in fewer loops than the rest are grouped, so that the group can be
+    /// computed outside these loops.
     pub(super) fn set(&mut self, operands: Operands) -> usize {
         let whole = operands
             .keys()

@@ -1,7 +1,8 @@
 //! Fractions k/d common to several products.
 //!
-//! Where d stands below several products, each with the factor k, the fraction k/d is computed once: the reciprocal 1/d would cost a
-//! product more. That holds for the force k x/(r √r) between two bodies, and its other components.
+//! Where d is a divisor of several products that all have the factor k, the fraction k/d is computed once: the
+//! reciprocal 1/d would cost one more product. An example is the force k x/(r √r) between two bodies, with its other
+//! components.
 
 use super::demand::Multiple;
 use crate::expr::function::Function;

@@ -4,11 +4,12 @@
 //! |computed − exact| ≤ error · 2⁻⁵³ (1 + small)        fl(a + b): error_a + error_b + |a + b|
 //! ```
 //!
-//! Inputs and numbers are exact. Each operation adds half an ulp of its result, a function a whole one; an operation whose result is exact at the
-//! numbers at hand, such as the difference of two that are close, adds nothing.
+//! Inputs and constants are exact. Each operation adds half an ulp of its result, a function a whole one; an operation
+//! whose result is exact for the given numbers, such as the difference of two that are close, adds nothing.
 //!
-//! A sum counts as exact where it is exact and no larger than the smallest input whose digits it has: as x − y of numbers that are close, or x − y − z
-//! of three such numbers. A larger one is exact or not as it happens to lie below or above a power of two.
+//! A sum counts as exact where it is exact and no larger than the smallest input whose digits it contains, as x − y of
+//! close numbers, or x − y − z of three such numbers. Whether a larger one is exact depends on whether it happens to
+//! lie below or above a power of two.
 
 use crate::expr::function::Function;
 
@@ -17,13 +18,15 @@ use crate::expr::function::Function;
 pub(crate) struct Bounded {
     pub(crate) value: f64,
     pub(crate) error: f64,
-    /// The bound of the error of the square root, where that is smaller than what follows from `error`: √(a²) is |a| to the last digit.
+    /// The error bound of the square root, where it is smaller than what follows from `error`: √(a²) is |a| to the last
+    /// digit.
     root_error: Option<f64>,
-    /// What the last digit of the computed value is worth: 2⁻⁵² times the smallest input or rounded number that it is an exact sum of.
+    /// The unit in the last place that the computed value can have: 2⁻⁵² times the smallest input or rounded number of
+    /// which it is an exact sum.
     grid: f64,
 }
 
-/// So much larger than the smallest input a sum may be.
+/// How much larger than the smallest input a sum may be.
 const SAME_SIZE: f64 = 1.0 + 1e-5;
 
 /// What the last digit of a number is worth that has as many as it can have, without regard to powers of two.

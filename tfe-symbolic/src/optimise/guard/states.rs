@@ -1,16 +1,18 @@
-//! States at which digits are easily lost: what a rewritten formula is compared at with the formula as declared.
+//! The states at which a rewritten formula is compared with the formula as declared: states at which digits are easily
+//! lost.
 //!
-//! A state is a number for each input. Cancellation is what hurts, so most states bring inputs close to each other: coordinates, velocities,
-//! parameters, or some of each are equal or nearly equal, beside large common offsets, or of opposite signs; parameters are of very different
-//! sizes in half of the states. The numbers depend on the position of an input among all inputs, not on its name.
+//! A state is a number for each input. Digits are lost by cancellation, so most states have inputs close to each other:
+//! coordinates, velocities, parameters, or some of each are equal or nearly equal, with large common offsets, or of
+//! opposite signs; in half of the states, parameters are of very different magnitudes. The numbers depend on the
+//! position of an input among all inputs, not on its name.
 
 use crate::expr::input::Input;
 
-/// How many states there are besides those with a parameter that is much larger than all else: each kind of cluster meets each offset with each
-/// spread once. The time of the guard is proportional to it.
+/// The number of states besides those with an outstanding parameter: each kind of cluster is combined with each offset
+/// and each spread once. The time of the guard is proportional to it.
 const STATES: usize = 140;
 
-/// So many parameters are much larger than all else in turn, in two states each.
+/// At most this many parameters are in turn made much larger than all other inputs, in two states each.
 const MAX_OUTSTANDING: usize = 12;
 
 /// How large such a parameter is.
@@ -30,13 +32,14 @@ const CLUSTERS: [Cluster; 7] = {
     ]
 };
 
-/// What they have in common.
+/// The common offsets of a cluster.
 const OFFSETS: [f64; 5] = [1.0, 1e3, 1e8, 1e5, 1e-3];
 
-/// How far they are from it, as a part of it.
+/// The distances from the common offset, relative to it.
 const SPREADS: [f64; 4] = [1e-3, 1e-6, 0.0, 1e-9];
 
-/// Where nothing is close, half of what moves is so small; and parameters are by so many decades larger or smaller than one.
+/// In states without clusters, half of the moving inputs are this small; and parameters are by this factor larger or
+/// smaller than one.
 const SMALL: f64 = 1e-3;
 const DECADES: f64 = 6.0;
 
@@ -139,8 +142,8 @@ pub(crate) fn number_of_states(inputs: &[Input]) -> usize {
     STATES + 2 * outstanding(inputs).len()
 }
 
-/// A state with a parameter that is much larger than all else: in every other one nothing moves fast, so that forces at rest are seen, too; in
-/// the others all coordinates are equal.
+/// A state with a parameter that is much larger than all other inputs. In every second one nothing moves fast, so that
+/// forces at rest are compared as well; in the others all coordinates are equal.
 fn state_with_outstanding(inputs: &[Input], number: usize) -> Vec<f64> {
     let number_of_outstanding = number - STATES;
     let large = outstanding(inputs).get(number_of_outstanding / 2).copied();

@@ -1,7 +1,8 @@
 //! Values of operations in a finite field: equal expressions have equal values, and different ones almost never.
 //!
-//! Inputs are residues modulo the prime 2⁶¹ − 1 that look random. Sums, products and quotients are those of the field, so that whatever
-//! follows from the rules of arithmetic is seen, and sin² + cos² = 1 is as well. All other functions are numbers of their own.
+//! Inputs are pseudo-random residues modulo the prime 2⁶¹ − 1. Sums, products and quotients are those of the field, so
+//! that all consequences of the rules of arithmetic are found, and those of sin² + cos² = 1 as well. The values of all
+//! other functions are independent numbers.
 
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;

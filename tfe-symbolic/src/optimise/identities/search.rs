@@ -155,7 +155,8 @@ impl<'a> Search<'a> {
         uses
     }
 
-    /// The operations that only the target needs, itself with them, and what each costs together with those that only it needs.
+    /// The operations that only the target needs, including itself, with the cost of each together with those that only
+    /// it needs.
     pub(super) fn alone(&self, target: OpId, uses: &[u32]) -> SortedMap<OpId, usize> {
         let mut left: SortedMap<OpId, u32> = SortedMap::new();
         let mut alone = SortedMap::from([(target, weight(self.plan, target))]);
@@ -173,7 +174,8 @@ impl<'a> Search<'a> {
         alone
     }
 
-    /// The operations that may stand in a formula for the target: they do not need it, and are defined wherever it is.
+    /// The operations that may be used in a formula for the target: they do not depend on it, and are defined wherever
+    /// it is.
     pub(super) fn usable(&self, target: OpId) -> Vec<bool> {
         let mut needs = vec![false; self.plan.len()];
         needs[target.index()] = true;
@@ -191,8 +193,8 @@ impl<'a> Search<'a> {
         usable
     }
 
-    /// Whether something that moves is added to something else before another that moves: (x − y) − c may cancel before a digit is rounded away, (x − c) − y may not,
-    /// and beside larger terms no sample shows it.
+    /// Whether a moving input is added to something else before it is combined with another moving one: (x − y) − c may
+    /// cancel before a digit is rounded away, (x − c) − y may not, and with larger terms no sample state would show it.
     pub(super) fn parts_what_moves(&self, formula: &Formula) -> bool {
         let Formula::Sum(terms) = formula else {
             return false;

@@ -1,4 +1,4 @@
-//! Proofs that results never share a place, for ranges that are fixed at run time only.
+//! Proofs that results never share a place, for ranges that are known only at run time.
 
 use crate::expr::graph::SumRange;
 use crate::expr::input::Affine;
@@ -8,7 +8,7 @@ use crate::program::Place;
 /// Results and the loops that they are written in.
 type Written<'a> = (&'a [SumRange], &'a Place);
 
-/// Whether no place of an array is written to twice, as far as can be seen.
+/// Whether it can be proved that no place of an array is written to twice.
 pub(super) fn all_apart(all: &[Written]) -> bool {
     all.iter().all(new_on_every_turn)
         && all
@@ -17,7 +17,7 @@ pub(super) fn all_apart(all: &[Written]) -> bool {
             .all(|(at, one)| all[..at].iter().all(|other| apart(one, other)))
 }
 
-/// Whether the place is another one on every turn: each variable is read off an index in which it stands alone.
+/// Whether the place is a different one on every turn: each variable appears alone in some index.
 fn new_on_every_turn((nest, place): &Written) -> bool {
     nest.iter().all(|range| {
         // Two entries of a list may be equal.
@@ -36,7 +36,7 @@ fn new_on_every_turn((nest, place): &Written) -> bool {
 fn apart(one: &Written, other: &Written) -> bool {
     let indices = |(_, place): &Written| [place.row.clone(), place.column.clone()];
     let ([row, column], [other_row, other_column]) = (indices(one), indices(other));
-    // The differences row − column are two different numbers.
+    // The differences row − column are two different constants.
     let difference = |row: &Affine, column: &Affine| row.plus_scaled(column, -1);
     let both = difference(&row, &column).zip(difference(&other_row, &other_column));
     let off = both.and_then(|(a, b)| a.as_constant().zip(b.as_constant()));

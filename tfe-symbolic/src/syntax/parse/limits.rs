@@ -10,7 +10,7 @@ pub const MAX_NESTING: usize = 100;
 /// Operators along one path of the tree; dropping and printing a tree recurse along it.
 pub const MAX_OPERATORS: usize = 2000;
 
-/// One linear look at the text, so that neither pest nor the tree can exhaust the stack.
+/// Checks the limits in one linear pass over the text, so that neither pest nor the tree can exhaust the stack.
 pub(super) fn within_limits(text: &str) -> Result<(), (Bytes<usize>, Kind)> {
     // For each open bracket: (tight operators in a row, operators).
     let mut levels = vec![(0usize, 0usize)];

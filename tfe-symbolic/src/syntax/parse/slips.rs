@@ -1,4 +1,4 @@
-//! What users of Rust and of other notations write by habit where the grammar stops: each with a message of its own.
+//! Habits from Rust and from other notations at which the grammar stops: each has a message of its own.
 
 use std::ops::Range as Bytes;
 
