@@ -1,4 +1,4 @@
-//! The diagonals of blocks from what stands beside them, as Rust statements.
+//! The diagonals of blocks of second derivatives, as negative sums of the entries off the diagonal, in Rust statements.
 
 use crate::indices::index;
 use proc_macro2::TokenStream;
@@ -6,9 +6,9 @@ use quote::quote;
 use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::program::{Array, Place};
 
-/// The sums of all columns at once where their number is known, else one by one.
+/// The sums of all columns at once if their number is known, otherwise one by one.
 ///
-/// No methods of iterators: their traits are in scope with the prelude of Rust only.
+/// Methods of iterators are not used: their traits are in scope only with the prelude of Rust.
 pub(crate) fn balance(second: &TokenStream, output: &Place, length: &Affine) -> TokenStream {
     let entry = |output: &Place, row: &TokenStream, column: &TokenStream| {
         let array = match output.array {

@@ -12,12 +12,13 @@ use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Constraint, ConstraintKind, Declared};
 use tfe_symbolic::program::{Array, Program, Request, Statement};
 
-/// What the kernels compute: φ(q, t), ψ(q, v, t) = A(q, t) v + a(q, t), and what Newton's method needs besides.
+/// The quantities that the kernels compute: φ(q, t), ψ(q, v, t) = A(q, t) v + a(q, t), and the derivatives that
+/// Newton's method needs.
 pub(crate) const VALUES: &str = "φ(q, t)";
 pub(crate) const ROWS: &str = "A and a of ψ = A v + a";
 const SECOND: &str = "∂ψ/∂q, Ȧ, ∂(Aᵀμ)/∂q, ∂(Ȧᵀμ)/∂q and ∂(Ȧᵀμ)/∂v";
 
-/// What an implementation of `Model` holds of constraints: nothing where there are none.
+/// The members for constraints in an implementation of `Model`; none if there are no constraints.
 pub(crate) fn members(
     declared: &Declared,
     derivation: &Derivation,
@@ -58,7 +59,7 @@ struct Kernels<'a> {
     declared: &'a Declared,
     derivation: &'a Derivation,
     coordinates: &'a [String],
-    /// The numbers of the parameters.
+    /// The indices of the parameters.
     places: &'a SortedMap<String, Affine>,
     dof: TokenStream,
     count: Literal,
@@ -74,7 +75,8 @@ impl Kernels<'_> {
             .statements
     }
 
-    /// The first elements of a slice as an array: one look at the length instead of one an index, and none that can panic.
+    /// The first elements of a slice as an array: one check of the length instead of one for each index, and none that
+    /// can panic.
     fn chunk(&self, name: &TokenStream, slice: &TokenStream) -> TokenStream {
         let count = &self.count;
         quote! {

@@ -1,10 +1,10 @@
-//! What kernels are called, and what they take beside time and state, where a model has inputs.
+//! The names and the additional arguments of kernels in models with inputs.
 
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 use tfe_symbolic::model::declared::Declared;
 
-/// The inputs among the parameters and the arguments of kernels; nothing where there are none.
+/// The inputs among the parameters and the arguments of kernels; empty if there are none.
 pub(crate) struct Controls {
     pub(crate) parameter: TokenStream,
     pub(crate) argument: TokenStream,

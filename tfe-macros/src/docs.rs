@@ -1,11 +1,11 @@
-//! Doc comments inside the attribute: those before an argument go to what is generated for it.
+//! Doc comments inside the attribute: a comment before an argument documents what is generated for it.
 
 use crate::source_map::SourceMap;
 use proc_macro2::TokenStream;
 use quote::quote;
 use tfe_symbolic::syntax::parse;
 
-/// The doc comments of the arguments, each line with the argument that it stands before, or inside of.
+/// The doc comments of the arguments, each line with the argument that it precedes or is inside.
 #[derive(Default)]
 pub(crate) struct Docs(Vec<Doc>);
 
@@ -13,13 +13,13 @@ pub(crate) struct Docs(Vec<Doc>);
 struct Doc {
     /// `output`, `let`
     word: String,
-    /// The name that the argument declares, where it declares one; else what stands there.
+    /// The name that the argument declares, if it declares one; otherwise its text.
     name: String,
-    /// What stands right of `doc =`.
+    /// The tokens to the right of `doc =`.
     text: TokenStream,
 }
 
-/// The arguments whose first word in parentheses, or behind `let`, is a name.
+/// The arguments whose first word in parentheses, or after `let`, is a name.
 const NAMED: &[&str] = &[
     "let",
     "force",
@@ -30,7 +30,7 @@ const NAMED: &[&str] = &[
     "model",
 ];
 
-/// The arguments for which something with a documentation of its own is generated.
+/// The arguments for which an item with documentation of its own is generated.
 const DOCUMENTED: &[&str] = &["output", "solver", "model"];
 
 impl Docs {
@@ -57,13 +57,14 @@ impl Docs {
         docs
     }
 
-    /// Those of outputs: models made from this one inherit outputs.
+    /// The comments of outputs: models made from this one inherit outputs.
     pub(crate) fn of_outputs(&self) -> Self {
         let outputs = self.0.iter().filter(|doc| doc.word == "output");
         Self(outputs.cloned().collect())
     }
 
-    /// The attributes for what an argument generates, with an empty line behind; nothing where there is no comment.
+    /// The doc attributes for the item that an argument generates, followed by an empty line; nothing if there is no
+    /// comment.
     pub(crate) fn attributes(&self, word: &str, name: &str) -> TokenStream {
         let own = self.0.iter();
         let own: Vec<_> = own

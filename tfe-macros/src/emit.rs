@@ -15,7 +15,8 @@ use tfe_symbolic::expr::input::{Affine, Input, LoopVariable};
 use tfe_symbolic::expr::ordered::{SortedMap, SortedSet};
 use tfe_symbolic::program::{Array, Operand, Operation, Program, Statement, Temporary};
 
-/// The arguments and variables of kernels, beside temporaries (`t0`, `sin_x`), indices, and names that begin with two underscores.
+/// The arguments and variables of kernels, besides temporaries (`t0`, `sin_x`), indices, and names that begin with two
+/// underscores.
 pub(crate) const LOCALS: [&str; 16] = [
     "q",
     "z",
@@ -41,23 +42,24 @@ pub(crate) struct Emitter<'a> {
     coordinates: &'a [String],
     /// The names of the inputs, in order.
     inputs: &'a [String],
-    /// The numbers of parameters, of arrays that of the first element, by their fields.
+    /// The indices of parameters by their fields; for arrays that of the first element.
     places: &'a SortedMap<String, Affine>,
     /// The same of a model of run-time length.
     run_time_places: SortedMap<String, TokenStream>,
-    /// Where second derivatives go: `second.`, or nothing where the mass matrix alone is an argument.
+    /// The prefix of second derivatives: `second.`, or empty if the mass matrix is the only one and an argument of its
+    /// own.
     second: TokenStream,
-    /// Second derivatives are told entry by entry, as those of models of run-time length are.
+    /// Whether second derivatives are reported entry by entry, as in models of run-time length.
     by_entries: bool,
-    /// The places of results hold zeros already.
+    /// Whether the memory for results contains zeros at the start.
     onto_zeros: bool,
-    /// Every place of L_q is written just once.
+    /// Whether every entry of L_q is written exactly once.
     assigns: bool,
-    /// What velocities and momenta are called.
+    /// The name of velocities or momenta.
     z: Ident,
-    /// What results are called, in headings.
+    /// The names of results in headings.
     headings: Option<Headings>,
-    /// How often each temporary is read.
+    /// The number of reads of each temporary.
     reads: SortedMap<Temporary, usize>,
     /// The indices of all loops.
     indices: SortedSet<String>,
@@ -67,12 +69,12 @@ pub(crate) struct Emitter<'a> {
     taken: SortedSet<String>,
     numbered: usize,
     parameters: SortedMap<String, Ident>,
-    /// The places of what later parts read.
+    /// The places of values that later parts read.
     keeps: SortedMap<Temporary, usize>,
     value: Option<TokenStream>,
 }
 
-/// What the functions of a kernel in parts are called and given.
+/// The name and the arguments of the functions into which a long kernel is divided.
 pub(crate) struct Signature {
     /// The kernel: its parts are `__tfe_name_1`, ….
     pub(crate) name: &'static str,
@@ -80,13 +82,13 @@ pub(crate) struct Signature {
     pub(crate) parameters: TokenStream,
     /// The same without types.
     pub(crate) arguments: TokenStream,
-    /// Whether the parts are written into the place of their call, as they must be where they are compiled for its instruction set.
+    /// Whether the parts are inlined, as they must be where they are compiled for the instruction set of the caller.
     pub(crate) inline: bool,
 }
 
-/// The statements of a kernel, and the expression of the energy function where it was asked for.
+/// The statements of a kernel and, if it was requested, the expression of the energy function.
 pub(crate) struct Body {
-    /// The functions that the statements call, members of an `impl` of the model; none but for long kernels.
+    /// The functions that the statements call, members of an `impl` of the model; only for long kernels.
     pub(crate) parts: TokenStream,
     /// `let` statements, loops and assignments.
     pub(crate) statements: TokenStream,
@@ -127,7 +129,7 @@ impl<'a> Emitter<'a> {
         self
     }
 
-    /// The same for a model whose parameters have numbers.
+    /// The same for a model whose parameters are numbered.
     pub(crate) fn with_parameters(mut self, places: &'a SortedMap<String, Affine>) -> Self {
         self.places = places;
         self
@@ -148,25 +150,25 @@ impl<'a> Emitter<'a> {
         self
     }
 
-    /// The same with headings that tell the results.
+    /// The same with headings that name the results.
     pub(crate) fn with_headings(mut self, headings: Headings) -> Self {
         self.headings = Some(headings);
         self
     }
 
-    /// The same with second derivatives given to `entries`.
+    /// The same with second derivatives reported to `entries`.
     pub(crate) fn by_entries(mut self) -> Self {
         self.by_entries = true;
         self
     }
 
-    /// The same, for places that hold zeros when the kernel begins.
+    /// The same for memory that contains zeros when the kernel begins.
     pub(crate) fn onto_zeros(mut self) -> Self {
         self.onto_zeros = true;
         self
     }
 
-    /// The same, where every place of L_q is written just once.
+    /// The same if every entry of L_q is written exactly once.
     pub(crate) fn assigning(mut self, assigns: bool) -> Self {
         self.assigns = assigns;
         self
@@ -184,7 +186,7 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    /// The body of a kernel that is cut into parts where it is long.
+    /// The body of a kernel, which is divided into parts if it is long.
     pub(crate) fn body_in_parts(mut self, program: &Program, signature: &Signature) -> Body {
         let Some(Parts { parts, kept, value }) = Parts::of(&program.statements) else {
             return self.body(program);
@@ -244,7 +246,7 @@ impl<'a> Emitter<'a> {
             .unzip();
         let reads = (!names.is_empty()).then(|| quote!(let [#(#names),*] = [#(kept[#places]),*];));
         let statements = self.statements(&part.statements);
-        // Running sums are kept when they have their last value.
+        // Running sums are kept once they have their final value.
         let sums = part
             .statements
             .iter()
@@ -257,7 +259,7 @@ impl<'a> Emitter<'a> {
         quote!(#parameters #reads #statements #sums)
     }
 
-    /// Hands a value on, if a later part reads it.
+    /// Stores a value for later parts, if one of them reads it.
     fn kept(&self, temporary: Temporary) -> TokenStream {
         let Some(place) = self.keeps.get(&temporary) else {
             return TokenStream::new();
@@ -330,7 +332,7 @@ impl<'a> Emitter<'a> {
             if let Some(heading) = heading {
                 tokens.extend(quote!(#[doc = #heading]));
             }
-            // A result that nothing else needs is written where it belongs, without a temporary.
+            // A result that nothing else needs is written directly to its place, without a temporary.
             let in_place = is_written_in_place(rest, &self.reads);
             rest = after;
             if let (true, Statement::Let { operation, .. }, Some(next)) =
@@ -519,7 +521,7 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    /// The local variable of a parameter: its own name unless that could be one of the emitter's.
+    /// The local variable of a parameter: the name of its field, unless the emitter might use that name itself.
     fn local_name(&self, field: &str) -> Ident {
         let temporary = field
             .strip_prefix('t')

@@ -1,4 +1,4 @@
-//! From tokens to tokens: the whole expansion, read from top to bottom.
+//! The whole expansion, from tokens to tokens; it can be read from top to bottom.
 
 mod sensitivities;
 mod without_inputs;
@@ -24,18 +24,19 @@ use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Declared, Form, Observable, names};
 use tfe_symbolic::program::{Program, Request};
 
-/// Kernels of more operations are not compiled once more for several points at once: they would take longer to compile than they save.
+/// Kernels with more operations are not compiled a second time for several points at once: that would take longer to
+/// compile than it saves.
 const LANES_LIMIT: usize = 4000;
 
-/// Larger kernels are compiled for lanes only where the compiler optimises: unoptimised, lanes are no faster, and of the arm of six links in space
-/// (2600 operations) they take four of nine seconds. Results are the same.
+/// Without optimisation, larger kernels are not compiled for lanes: lanes are then no faster, and for the arm of six
+/// links in space (2600 operations) they take four of nine seconds. The results are the same.
 const UNOPTIMISED_LANES_LIMIT: usize = 500;
 
 /// Expands `#[dynamics(arguments)] item`.
 pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
     let map = SourceMap::new(arguments);
     let wrong = |item: TokenStream, errors: TokenStream| {
-        // Of an item that is no type, only the error can be told.
+        // For an item that is not a type, only the error can be reported.
         let stubs = syn::parse2(item.clone())
             .map(|item| fallback::stubs(&item, &map))
             .unwrap_or_default();
@@ -68,7 +69,7 @@ pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
             let messages = diagnostics
                 .iter()
                 .map(|d| fallback::compile_error(d, &map, &item_struct));
-            // Of coordinates whose number is a const parameter the engine has said so.
+            // For coordinates whose number is a const parameter, the engine has reported it.
             let is_said = diagnostics
                 .iter()
                 .any(|d| matches!(d.kind, Kind::SolverOfFamily { .. }));
@@ -125,7 +126,7 @@ fn model(
     }
 }
 
-/// Where emitted code finds the runtime: `::tfe`, or what `crate = path` says.
+/// The path of the runtime in emitted code: `::tfe`, or that of `crate = path`.
 fn runtime_path(declared: &Declared, map: &SourceMap) -> TokenStream {
     let path = declared.crate_path.as_deref();
     path.and_then(|path| map.path(path))
@@ -167,12 +168,12 @@ impl<'a> Kernels<'a> {
         }
     }
 
-    /// The body of a kernel; second derivatives go to fields of `second`, or to an argument.
+    /// The body of a kernel; second derivatives are written to fields of `second`, or to an argument.
     fn body(&self, request: Request, second: TokenStream) -> emit::Body {
         self.emitted(&self.derivation.program(request), second)
     }
 
-    /// The body of a kernel that is cut into parts where it is long.
+    /// The body of a kernel, which is divided into parts if it is long.
     fn body_in_parts(
         &self,
         request: Request,
@@ -232,7 +233,8 @@ impl<'a> Kernels<'a> {
             second: true,
             ..first
         };
-        // Linear models step by a matrix, constrained ones by Newton's method: neither evaluates points side by side.
+        // Linear models are stepped by a matrix, constrained ones by Newton's method: neither evaluates points side by
+        // side.
         let operations = page::total(&self.derivation.counts(mass));
         let lanes = self.declared.constraints.is_empty()
             && !self.derivation.structure().linear
@@ -542,7 +544,7 @@ impl<'a> Kernels<'a> {
             Form::Lagrangian => (quote!(v), "velocities"),
             Form::Hamiltonian => (quote!(p), "momenta"),
         };
-        // Beside the coordinate `t` the time of the steps has another name.
+        // If there is a coordinate `t`, the time of the steps has another name.
         let time = match self.declared.time_transformation {
             None => quote!(t),
             Some(_) => quote!(tau),

@@ -1,4 +1,5 @@
-//! What is emitted when the declaration is wrong: every mistake as a `compile_error!`, and stubs that keep rustc from reporting follow-ups.
+//! The output for a wrong declaration: every mistake as a `compile_error!`, and stubs that prevent further errors of
+//! rustc.
 
 mod family;
 mod variant;
@@ -14,7 +15,7 @@ use tfe_symbolic::syntax::ast::{Array, ExprKind, Item};
 use tfe_symbolic::syntax::parse;
 use variant::Variant;
 
-/// `compile_error!` under the tokens that the diagnostic speaks of.
+/// `compile_error!` under the tokens to which the diagnostic refers.
 pub(crate) fn compile_error(
     diagnostic: &Diagnostic,
     map: &SourceMap,
@@ -39,7 +40,7 @@ pub(crate) fn error((first, last): (Span, Span), message: &str) -> TokenStream {
     quote!(#path #group)
 }
 
-/// A message under each attribute between arguments, such as a `cfg`: these are read without it.
+/// A message for each attribute between arguments, such as a `cfg`; the arguments are read without it.
 pub(crate) fn attributes_of_arguments(map: &SourceMap) -> TokenStream {
     let message = "arguments have no attributes but doc comments\nhelp: put a `cfg` on the whole struct, and declare it once for each configuration";
     map.attributes
@@ -58,9 +59,10 @@ fn field_span(name: &str, item: &ItemStruct) -> (Span, Span) {
     (span, span)
 }
 
-/// Stub implementations for a type whose declaration is wrong: uses of the model type-check, so only the mistake itself is reported.
+/// Stub implementations for a type whose declaration is wrong: uses of the model type-check, so that only the mistake
+/// itself is reported.
 ///
-/// Their arguments have names that no const parameter has, which may be what is wrong.
+/// Their arguments have names that no const parameter can have, because a name may be the mistake.
 pub(crate) fn stubs(item: &DeriveInput, map: &SourceMap) -> TokenStream {
     let guess = Guess::from(map, item);
     let own = implementations(item, &guess);
@@ -222,7 +224,7 @@ fn implementations(item: &DeriveInput, guess: &Guess) -> TokenStream {
     }
 }
 
-/// A stepper that does nothing, for any number of coordinates: that of the model may be what is wrong.
+/// A stepper that does nothing, for any number of coordinates, because that of the model may be the mistake.
 fn solver_stub(solver: &Ident, item: &DeriveInput, path: &TokenStream) -> TokenStream {
     let (name, vis) = (&item.ident, &item.vis);
     let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
@@ -260,7 +262,7 @@ fn solver_stub(solver: &Ident, item: &DeriveInput, path: &TokenStream) -> TokenS
     }
 }
 
-/// What can be told of a wrong declaration.
+/// What can be guessed about a wrong declaration.
 #[derive(Clone)]
 struct Guess {
     path: TokenStream,
@@ -268,7 +270,7 @@ struct Guess {
     /// The number of coordinates is known at run time only.
     run_time: bool,
     hamiltonian: bool,
-    /// The time is one coordinate more.
+    /// Whether the time is an additional coordinate.
     transformed: bool,
     outputs: Vec<Ident>,
     /// Which of them are declared by site.
@@ -327,7 +329,7 @@ impl Guess {
                 _ => {}
             }
         }
-        // A name that clashes has been reported; rustc would repeat it.
+        // A conflicting name has been reported; rustc would report it again.
         let mut seen = SortedSet::from(["state".to_owned(), "structure".to_owned()]);
         if guess.transformed {
             seen.insert("state_at".to_owned());
@@ -412,7 +414,7 @@ fn count(arrays: &[Array], item: &DeriveInput) -> TokenStream {
     quote!(#fixed)
 }
 
-/// How many names stand in `coordinates(x, y z)`, which cannot be read; of arrays the name alone.
+/// The number of names in an unreadable `coordinates(x, y z)`; of arrays the name alone counts.
 fn named_coordinates(argument: &str) -> Option<usize> {
     let is_word = |letter: char| letter.is_alphanumeric() || letter == '_';
     let names = argument.trim_start().strip_prefix("coordinates")?;
@@ -432,7 +434,8 @@ fn named_coordinates(argument: &str) -> Option<usize> {
     (count > 0).then_some(count)
 }
 
-/// What models with inputs are asked for: a type parameter, which is a mistake, need not be more than it is.
+/// The bounds that models with inputs require, so that a type parameter, which is a mistake anyway, causes no further
+/// errors.
 fn shared(item: &DeriveInput) -> Option<WhereClause> {
     let mut shared = item.generics.clone();
     (shared.make_where_clause().predicates)

@@ -50,7 +50,7 @@ struct Kernels<'a> {
     dof: TokenStream,
 }
 
-/// Which slices a kernel is given.
+/// The slices that a kernel receives.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Given {
     Nothing,
@@ -61,12 +61,12 @@ enum Given {
 }
 
 impl Kernels<'_> {
-    /// The body of a kernel, with its slices cut to the length of the model so that the compiler knows it.
+    /// The body of a kernel, with its slices cut to the length of the model, so that the compiler knows their lengths.
     fn body(&self, program: &Program, given: Given) -> Body {
         self.body_by(self.emitter(), program, given)
     }
 
-    /// The same of a kernel that is differentiated by parameters.
+    /// The same for a kernel that can be differentiated by parameters.
     fn sensitive_body(&self, program: &Program, given: Given) -> Body {
         let places = self.parameters.places();
         let emitter = self.emitter().with_run_time_parameters(places);
@@ -128,7 +128,7 @@ impl Kernels<'_> {
         }
     }
 
-    /// The one loop of a kernel over the sites of the one array of coordinates.
+    /// The only loop of a kernel over the sites of the only array of coordinates.
     fn strides(&self, program: &Program) -> Option<Strides> {
         match &self.declared.coordinates[..] {
             [array] => strides::of(program, array.length.as_ref()?),
@@ -136,7 +136,7 @@ impl Kernels<'_> {
         }
     }
 
-    /// The kernel of forces with its loop over sites in strides; nothing where there is no such loop.
+    /// The kernel of forces with its loop over sites in strides; nothing if there is no such loop.
     fn in_strides(&self, program: &Program) -> Option<TokenStream> {
         let strides = self.strides(program)?;
         let cut = self.cut(Given::Forces);
@@ -178,7 +178,7 @@ impl Kernels<'_> {
         self.derivation.program(request)
     }
 
-    /// What the observables are called, and their kernel; nothing where there are none.
+    /// The names of the observables, and their kernel; nothing if there are none.
     fn observables(&self) -> Option<(TokenStream, TokenStream)> {
         let observables = &self.declared.observables;
         let request = Request {
@@ -382,7 +382,7 @@ impl Kernels<'_> {
         }
     }
 
-    /// The fields that lengths, ranges and indices are made of, each once.
+    /// The fields that appear in lengths, ranges and indices, each once.
     fn length_fields(&self) -> Vec<&str> {
         let mut affines: Vec<&Affine> = Vec::new();
         let coordinates = self.declared.coordinates.iter();
@@ -423,7 +423,7 @@ impl Kernels<'_> {
 
     /// The statements of `check`.
     fn check(&self) -> TokenStream {
-        // First of all, so that what follows does not overflow.
+        // First, so that later checks do not overflow.
         let longest = self.length_fields().into_iter().map(|name| {
             let field = indices::identifier(name);
             quote!(__tfe::checks::length(#name, self.#field)?;)
@@ -474,7 +474,7 @@ impl Kernels<'_> {
                     };
                     let index = quote!((#array, #text, #ranges));
                     let one = match entries[..] {
-                        // Of one entry the message names the list and the place.
+                        // For a single entry the message names the list and the place.
                         [(list, at)] => {
                             let (field, at) = (indices::identifier(list), indices::index(at));
                             let entry = quote!((#list, &self.#field, #at));
@@ -572,7 +572,7 @@ impl Kernels<'_> {
     }
 }
 
-/// A number of coordinates, which saturates rather than overflows.
+/// A number of coordinates, which saturates instead of overflowing.
 fn length(affine: &Affine) -> TokenStream {
     if affine.constant == 0 && affine.terms.len() == 1 {
         return indices::index(affine);

@@ -1,4 +1,4 @@
-//! Random declarations through the whole expansion: the macro answers all of them with items, and panics at none.
+//! Random declarations through the whole expansion: for each of them the macro returns items, and never panics.
 //!
 //! `FUZZ=100000 cargo test --release -p tfe-macros fuzz -- --nocapture` tries more of them.
 

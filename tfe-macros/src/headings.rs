@@ -1,4 +1,4 @@
-//! Headings inside of kernels: which results the statements that follow lead to.
+//! Headings inside kernels, which name the results that the following statements compute.
 //!
 //! ```text
 //! /// ∂L/∂θ̇₁, ∂L/∂θ̇₂
@@ -8,8 +8,9 @@
 //! first.z[1] = …;
 //! ```
 //!
-//! Comments do not survive in tokens; documentation before a `let` does, and costs nothing at run time. Assignments cannot have any. The order of
-//! statements is that of few live values: a part of a later result stands where it needs the least registers, and the heading says so.
+//! Comments do not survive in tokens; documentation before a `let` does, and costs nothing at run time. Assignments
+//! cannot have any. Statements are in an order with few live values: a part of a later result may come where it needs
+//! the fewest registers, and the heading says so.
 
 use crate::in_place::is_written_in_place;
 use crate::parts::LONG_KERNEL;
@@ -20,7 +21,7 @@ use tfe_symbolic::model::declared::{Declared, Form, names};
 use tfe_symbolic::model::notation;
 use tfe_symbolic::program::{Array, Operand, Place, Statement, Temporary};
 
-/// So many results are told by name; of more, the arrays are.
+/// Up to this number of results are named; for more, the arrays are.
 const MAX_RESULTS: usize = 4;
 
 /// The names of a model's results.
@@ -56,7 +57,8 @@ impl Headings {
         }
     }
 
-    /// Headings by the positions of the statements that they stand before; none for kernels with one group of statements, or that are not read.
+    /// The headings, by the positions of the statements before which they are placed; none for kernels with one group
+    /// of statements, or that are not meant to be read.
     pub(crate) fn place(
         &self,
         statements: &[Statement],
@@ -80,7 +82,8 @@ impl Headings {
         headings
     }
 
-    /// What the results of a group are, and whether other results need some of it. Where a result has no name of its own, as in a loop, the arrays are told.
+    /// The names of the results of a group, and whether other results need some of its values. Where a result has no
+    /// name of its own, as in a loop, the array is named.
     fn heading(&self, group: &[Statement]) -> Option<String> {
         let mut results: Vec<&Place> = group.iter().flat_map(results).collect();
         sort(&mut results);
@@ -119,7 +122,7 @@ impl Headings {
             true => format!("∂²{letter}/∂{a}²"),
             false => format!("∂²{letter}/∂{a}∂{b}"),
         };
-        // Entries on both sides of a diagonal are one derivative.
+        // Entries on both sides of a diagonal are the same derivative.
         let ordered = || match row.as_constant() <= column.as_constant() {
             true => (row, column),
             false => (column, row),
@@ -168,7 +171,8 @@ impl Headings {
     }
 }
 
-/// Statements up to results, and the results, again and again; what is left behind the last result is no group. A loop with results belongs to what stands before it.
+/// Groups of statements, each ending with results; what follows the last result is no group. A loop with results
+/// belongs to the statements before it.
 fn groups(statements: &[Statement], reads: &SortedMap<Temporary, usize>) -> Vec<Range<usize>> {
     let (mut groups, mut begin, mut end) = (Vec::new(), 0, 0);
     for (at, statement) in statements.iter().enumerate() {
@@ -225,7 +229,7 @@ fn takes_documentation(statement: &Statement) -> bool {
     )
 }
 
-/// Whether the results of a group need all that is computed in it.
+/// Whether the results of a group need everything that is computed in it.
 fn needs_all(group: &[Statement]) -> bool {
     let mut needed: SortedSet<Temporary> = SortedSet::new();
     group.iter().rev().all(|statement| {

@@ -1,9 +1,9 @@
-//! Results that are written where they belong, without a temporary.
+//! Results that are written directly to their places, without a temporary.
 
 use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::program::{Operand, Statement, Temporary};
 
-/// Whether the first statement computes what the next one writes, and nothing else needs that.
+/// Whether the first statement computes a value that the next one writes, and that nothing else needs.
 pub(crate) fn is_written_in_place(
     statements: &[Statement],
     reads: &SortedMap<Temporary, usize>,

@@ -4,7 +4,8 @@ use proc_macro2::{Ident, Literal, Span, TokenStream};
 use quote::{format_ident, quote};
 use tfe_symbolic::expr::input::{Affine, IndexSymbol, LoopVariable};
 
-/// An identifier, raw where it must be; with a line below where not even that is a name (which has been reported).
+/// An identifier, raw where necessary, and with a trailing underscore where not even that is a name (which has been
+/// reported).
 pub(crate) fn identifier(name: &str) -> Ident {
     match name {
         "_" | "crate" | "self" | "super" | "Self" => format_ident!("__{name}"),
@@ -19,7 +20,7 @@ pub(crate) fn loop_name(variable: LoopVariable) -> Ident {
     format_ident!("{}", variable.to_string())
 }
 
-/// An index as a `usize` expression that cannot overflow: what is subtracted saturates at zero.
+/// An index as a `usize` expression that cannot overflow: subtraction saturates at zero.
 pub(crate) fn index(affine: &Affine) -> TokenStream {
     less_each(affine, less)
 }
@@ -114,7 +115,7 @@ pub(crate) fn signed(affine: &Affine) -> TokenStream {
     let mut sum = TokenStream::new();
     for (symbol, coefficient) in &affine.terms {
         let symbol = match symbol {
-            // Whatever a list holds, sums of entries do not overflow.
+            // Sums of entries do not overflow, whatever a list contains.
             IndexSymbol::Entry(..) => {
                 let entry = symbol_tokens(symbol);
                 quote!(__tfe::checks::small(#entry))
@@ -156,7 +157,7 @@ fn at(array: &TokenStream, indices: &[&Affine]) -> TokenStream {
     quote!(#array #([#indices])*)
 }
 
-/// A number as a literal; what has none (infinities) by name.
+/// A number as a literal, or as a constant if it has no literal (infinities).
 pub(crate) fn number(value: f64) -> TokenStream {
     if value.is_nan() {
         quote!(::core::primitive::f64::NAN)

@@ -12,7 +12,7 @@ use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 /// The struct under the attribute.
 ///
 /// # Errors
-/// Anything but a struct.
+/// An error for anything other than a struct.
 pub(crate) fn parse(item: TokenStream) -> syn::Result<ItemStruct> {
     let span = name_span(item.clone());
     syn::parse2(item).map_err(|error| {
@@ -73,7 +73,7 @@ fn unusable(parameter: &GenericParam) -> Option<syn::Error> {
     Some(syn::Error::new_spanned(parameter, message))
 }
 
-/// Variables of generated code that are none of the kernels': arguments of methods, what stands in these, and indices of loops.
+/// Variables of generated code outside kernels: arguments of methods, their variables, and indices of loops.
 const VARIABLES: [&str; 15] = [
     "by", "end", "i", "index", "j", "k", "l", "left", "made", "model", "original", "p", "state",
     "tau", "value",
@@ -101,7 +101,8 @@ fn taken_by_generated_code(name: &Ident) -> Option<String> {
     ))
 }
 
-/// Takes further `#[dynamics]` away from the struct, and gives a message under each: the implementations would conflict.
+/// Removes further `#[dynamics]` attributes from the struct, with a message for each: the implementations would
+/// conflict.
 pub(crate) fn take_repeated(item: &mut ItemStruct) -> TokenStream {
     let (repeated, others) = std::mem::take(&mut item.attrs)
         .into_iter()
@@ -131,7 +132,8 @@ fn is_dynamics(attribute: &Attribute) -> bool {
     }
 }
 
-/// The visibility of the struct, for what is generated, in tokens of the generated code: with the user's own `pub`, lints would take generated functions for the user's.
+/// The visibility of the struct, for generated items, as tokens of the generated code: with the user's own `pub` token,
+/// lints would treat generated functions as the user's.
 pub(crate) fn visibility(item: &ItemStruct) -> TokenStream {
     match &item.vis {
         Visibility::Inherited => TokenStream::new(),
@@ -156,7 +158,7 @@ pub(crate) fn generated(name: &Ident) -> Ident {
     name
 }
 
-/// Lets generated code use a struct or a field that is deprecated; nothing where none is.
+/// Allows generated code to use a struct or a field that is deprecated; nothing if none is.
 pub(crate) fn of_deprecated(item: &ItemStruct) -> Option<TokenStream> {
     let of_fields = item.fields.iter().flat_map(|field| &field.attrs);
     let mut attributes = item.attrs.iter().chain(of_fields);
@@ -164,7 +166,7 @@ pub(crate) fn of_deprecated(item: &ItemStruct) -> Option<TokenStream> {
     is_deprecated.then(|| quote!(#[allow(deprecated)]))
 }
 
-/// What the engine is told about the struct.
+/// The description of the struct for the engine.
 pub(crate) fn context(item: &ItemStruct) -> Context {
     let const_parameters: Vec<String> = item
         .generics

@@ -1,4 +1,4 @@
-//! What must hold of const parameters: a constant that is evaluated where kernels are compiled for their values.
+//! Requirements on const parameters: a constant that is evaluated when kernels are compiled for their values.
 
 use crate::indices;
 use proc_macro2::TokenStream;
@@ -6,7 +6,7 @@ use quote::quote;
 use syn::ItemStruct;
 use tfe_symbolic::model::declared::{Declared, Extent, Requirement};
 
-/// The constant, and the statement with which a kernel asks for it; nothing where the engine could decide everything.
+/// The constant, and the statement by which a kernel evaluates it; empty if the engine could decide everything.
 pub(crate) struct Lengths {
     /// An inherent `impl` with the constant.
     pub(crate) constant: TokenStream,

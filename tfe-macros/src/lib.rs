@@ -1,7 +1,7 @@
 //! The `#[dynamics(...)]` attribute of [`tfe`](https://docs.rs/tfe).
 //!
-//! A thin shell: tokens become text with a table of places (`source_map`), the engine `tfe-symbolic` derives the model, and
-//! `expand` writes the resulting programs as Rust. See the documentation of `tfe` for the language.
+//! It is a thin shell: tokens become text with a table of places (`source_map`), the engine `tfe-symbolic` derives the
+//! model, and `expand` writes the resulting programs as Rust. The language is described in the documentation of `tfe`.
 
 mod balance;
 mod constraint;

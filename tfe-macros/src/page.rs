@@ -1,4 +1,4 @@
-//! What people read: the derived model in the struct's documentation, and the page of `Name::structure()`.
+//! Documentation of derived models: in the documentation of the struct, and as the page of `Name::structure()`.
 
 use proc_macro2::{Literal, TokenStream};
 use quote::quote;
@@ -8,10 +8,10 @@ use tfe_symbolic::model::declared::{Declared, Form, names};
 use tfe_symbolic::program::count::Counts;
 use tfe_symbolic::program::{Program, Request, Statement};
 
-/// Beyond so many operations the compiler's time for a kernel is felt.
+/// Beyond this number of operations, the compile time of a kernel becomes noticeable.
 const LARGE: usize = 10_000;
 
-/// The lines that the documentation of the struct gains.
+/// The lines that are added to the documentation of the struct.
 pub(crate) fn lines(declared: &Declared, derivation: &Derivation, documented: bool) -> Vec<String> {
     // A blank line after the user's own words.
     let mut lines = if documented {
@@ -29,7 +29,7 @@ pub(crate) fn lines(declared: &Declared, derivation: &Derivation, documented: bo
     lines
 }
 
-/// The three kernels whose cost is told.
+/// The three kernels whose costs are reported.
 struct Kernels {
     value: Counts,
     first: Counts,
@@ -134,7 +134,7 @@ pub(crate) fn kernel(formula: &str, program: &Program) -> String {
     }
 }
 
-/// The kinds that are told apart.
+/// The kinds of operations that are counted separately.
 struct Operations {
     additions: usize,
     multiplications: usize,
@@ -153,15 +153,15 @@ fn operations(counts: &Counts) -> Operations {
     }
 }
 
-/// What the kernels of a model compute, in formulas.
+/// The results of the kernels of a model, as formulas.
 pub(crate) struct Formulas {
     pub(crate) value: String,
     /// First derivatives and forces.
     pub(crate) first: String,
-    /// The same without derivatives by rates.
+    /// The same without derivatives by velocities or momenta.
     pub(crate) forces: String,
     pub(crate) mass: String,
-    /// All that the kernel of second derivatives adds to the first.
+    /// The results of the kernel of second derivatives, besides the first ones.
     pub(crate) second: String,
 }
 

@@ -1,5 +1,5 @@
-//! The parameters of a model by number: fields that are numbers, and the elements of fields that are arrays of numbers.
-//! Those of models of run-time length are numbered when they run.
+//! The numbering of the parameters of a model: fields that are numbers, and the elements of fields that are arrays of
+//! numbers. Those of models of run-time length are numbered at run time.
 
 use crate::indices::{identifier, index};
 use crate::input;
@@ -18,7 +18,8 @@ pub(crate) fn is_copy(kind: &FieldKind) -> bool {
     )
 }
 
-/// `name: from.name` for each field, or a clone of it where it is not `Copy`; nothing where a field is of a type that may not be `Clone`.
+/// `name: from.name` for each field, or a clone of it where it is not `Copy`; nothing if a field has a type that may
+/// not be `Clone`.
 fn copies(item: &ItemStruct, from: &TokenStream) -> Option<TokenStream> {
     let fields = input::context(item).fields;
     let copied = fields.iter().map(|field| {
@@ -33,7 +34,7 @@ fn copies(item: &ItemStruct, from: &TokenStream) -> Option<TokenStream> {
     Some(quote!(#(#copied),*))
 }
 
-/// The number of the parameter that a field is, or that its first element is.
+/// The indices of parameters: for each field that of the field itself or of its first element.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Parameters {
     fields: Vec<Place>,
@@ -46,7 +47,7 @@ struct Place {
     name: String,
     is_array: bool,
     first: Affine,
-    /// Beyond its last one.
+    /// One past the last parameter.
     end: Affine,
 }
 
@@ -82,7 +83,7 @@ impl Parameters {
         }
     }
 
-    /// The places of first numbers by the name of their field.
+    /// The indices of the first elements by the names of their fields.
     pub(crate) fn places(&self) -> SortedMap<String, Affine> {
         let place = |one: &Place| (one.name.clone(), one.first.clone());
         self.fields.iter().map(place).collect()
@@ -162,7 +163,8 @@ impl Parameters {
     }
 }
 
-/// `unnumbered`: what kernels read beside the numbered parameters, which of models of run-time length are the elements of vectors, too; nothing where there is nothing.
+/// `unnumbered`: what kernels read besides the numbered parameters, including the elements of vectors in models of
+/// run-time length; nothing if there is nothing.
 fn unnumbered(item: &ItemStruct, of_run_time: bool) -> TokenStream {
     let read = |Field { name, kind }: &Field| {
         let name = identifier(name);
@@ -313,7 +315,8 @@ impl RunTimeParameters {
     }
 }
 
-/// What is done with the parameter of a number: one arm a field, with its name and whether it is a single number.
+/// An arm for each field, for what is done with the parameter of an index, with the name of the field and whether it is
+/// a single number.
 fn arms_of(
     fields: &[(String, Option<TokenStream>)],
     arm: impl Fn(&str, bool) -> TokenStream,

@@ -1,24 +1,26 @@
-//! Long kernels in parts, each a function of its own.
+//! Long kernels in parts, each of which is a function of its own.
 //!
-//! What a part computes and a later one reads is handed on in an array, `kept`, whose places are used again as soon as they are free.
+//! Values that one part computes and a later one reads are stored in an array, `kept`, whose places are reused as soon
+//! as they are free.
 
 use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::expr::sorting::{sort, sort_by_key};
 use tfe_symbolic::program::{Array, Operand, Statement, Temporary};
 
-/// Kernels of more statements are emitted in parts.
+/// Kernels with more statements are emitted in parts.
 ///
-/// Tuned on serial arms in space of 1 to 12 links, whose longest kernels have 7 to 30 000 statements. Each `let` opens a scope within the
-/// one before, and in `dev` the compiler goes through them recursively: of some 3000 statements its stack overflows. Twice as many
-/// statements are still compiled in the same time.
+/// Tuned on serial arms in space of 1 to 12 links, whose longest kernels have 7 to 30 000 statements. Each `let` opens
+/// a scope within the one before, through which the compiler recurses in `dev`: with some 3000 statements its stack
+/// overflows. Twice as many statements are still compiled in the same time.
 pub(crate) const LONG_KERNEL: usize = 600;
 
-/// So many statements stand in a part.
+/// The number of statements in a part.
 ///
-/// Tuned on the same arms. With twice as many, optimisation takes longer, and nothing is faster; with half as many, more is handed on.
+/// Tuned on the same arms. With twice as many, optimisation takes longer and nothing is faster; with half as many, more
+/// values have to be stored.
 const MAX_PART: usize = 300;
 
-/// A stretch of a kernel.
+/// A part of a kernel.
 pub(crate) struct Part {
     /// What it does.
     pub(crate) statements: Vec<Statement>,
@@ -32,14 +34,14 @@ pub(crate) struct Part {
 pub(crate) struct Parts {
     /// In order.
     pub(crate) parts: Vec<Part>,
-    /// How many values are kept at most at a time.
+    /// The largest number of values stored at a time.
     pub(crate) kept: usize,
-    /// The value of the energy function, where it is asked for, and its place if a part has computed it.
+    /// The value of the energy function, if it was requested, and its place if a part has computed it.
     pub(crate) value: Option<(Operand, Option<usize>)>,
 }
 
 impl Parts {
-    /// The parts of a long kernel; nothing for a short one.
+    /// The parts of a long kernel; `None` for a short one.
     pub(crate) fn of(statements: &[Statement]) -> Option<Self> {
         if length(statements) <= LONG_KERNEL {
             return None;
@@ -100,7 +102,7 @@ fn length(statements: &[Statement]) -> usize {
     statements.len() + inside.sum::<usize>()
 }
 
-/// Cuts the statements where a part is full. Running sums are not parted from the loops that add to them.
+/// Divides the statements where a part is full. Running sums stay with the loops that add to them.
 fn cut(statements: Vec<Statement>) -> Vec<Vec<Statement>> {
     let mut changed = SortedMap::new();
     for (at, statement) in statements.iter().enumerate() {
@@ -126,7 +128,8 @@ fn cut(statements: Vec<Statement>) -> Vec<Vec<Statement>> {
     pieces
 }
 
-/// In which piece each value begins, and which is the last to read it; the energy function is read after the last piece.
+/// For each value the part that defines it and the last one that reads it; the energy function is read after the last
+/// part.
 fn lives(
     pieces: &[Vec<Statement>],
     value: Option<&Operand>,
@@ -150,14 +153,15 @@ fn lives(
     lives
 }
 
-/// A place for each value that outlives its piece, and how many places there are.
+/// A place for each value that is read in later parts, and the number of places.
 fn places(lives: &SortedMap<Temporary, (usize, usize)>) -> (SortedMap<Temporary, usize>, usize) {
     let mut kept: Vec<_> = lives
         .iter()
         .filter(|(_, (first, last))| first < last)
         .collect();
     sort_by_key(&mut kept, |(temporary, (first, _))| (*first, *temporary));
-    // The last reader of each place. A part reads before it keeps anything, so that its own reads end there.
+    // The last reader of each place. A part reads before it stores, so that places it reads last are free for its own
+    // values.
     let (mut places, mut ends): (SortedMap<Temporary, usize>, SortedMap<usize, Vec<usize>>) =
         Default::default();
     let (mut free, mut used) = (Vec::new(), 0);

@@ -15,7 +15,8 @@ use tfe_symbolic::syntax::context::FieldKind;
 use tfe_symbolic::syntax::parse;
 use tfe_symbolic::vocabulary::element::Rule;
 
-/// A message under each solver of a struct with const parameters: its memory is of one size, and its code for one type.
+/// A message for each solver of a struct with const parameters: the memory of a solver has one size, and its code one
+/// type.
 pub(crate) fn of_many_types(item: &ItemStruct, map: &SourceMap) -> TokenStream {
     let Some(parameter) = item.generics.const_params().next() else {
         return TokenStream::new();
@@ -142,7 +143,7 @@ pub(crate) fn expand(
     }
 }
 
-/// What copies fields that may not be `Clone`, where there are any; and the fields of a copy of `model`.
+/// The function that copies fields which may not be `Clone`, if there are any; and the fields of a copy of `model`.
 fn fields(item: &ItemStruct) -> (Option<TokenStream>, TokenStream) {
     let context = input::context(item);
     let (mut kept, mut fields) = (None, TokenStream::new());

@@ -1,13 +1,14 @@
-//! Attribute tokens as text, and the way back from a place in the text to the tokens.
+//! Converts the tokens of the attribute to text, and places in the text back to tokens.
 //!
-//! The engine parses text. On stable Rust the only precise spans are those of whole tokens, so every token's text is appended to a
-//! string together with a table of byte ranges; a diagnostic's range is translated to the first and the last token it touches.
+//! The engine parses text. On stable Rust only whole tokens have precise spans, so the text of every token is appended
+//! to a string together with a table of byte ranges; the range of a diagnostic is translated to the first and the last
+//! token that it touches.
 
 use proc_macro2::{Delimiter, Ident, Spacing, Span, TokenStream, TokenTree};
 use quote::quote;
 use std::ops::Range;
 
-/// What stands in the text for `$crate`, which is no word.
+/// The text for `$crate`, which is not a word.
 const DOLLAR_CRATE: &str = "__tfe_crate";
 
 /// The text of an attribute, and where each part of it came from.
@@ -16,9 +17,10 @@ pub(crate) struct SourceMap {
     pub(crate) text: String,
     entries: Vec<(Range<usize>, Span)>,
     end: Span,
-    /// Doc comments between and inside of arguments, which are no part of the text: where they stood, and what stood right of `doc =`.
+    /// Doc comments between and inside arguments, which are not part of the text: their places, and the tokens to the
+    /// right of `doc =`.
     pub(crate) docs: Vec<(usize, TokenStream)>,
-    /// Other attributes there, which are mistakes and no part of the text either: their first and last tokens.
+    /// Other attributes there, which are mistakes and not part of the text either: their first and last tokens.
     pub(crate) attributes: Vec<(Span, Span)>,
     /// `$crate` of the `macro_rules!` macro that wrote `crate = $crate::path`.
     dollar_crate: Option<Ident>,
@@ -98,7 +100,7 @@ impl SourceMap {
         self.entries.push((start..self.text.len(), span));
     }
 
-    /// Appends a word: a blank follows, so that two words never run together.
+    /// Appends a word, followed by a blank, so that two words never run together.
     fn push_separated(&mut self, text: &str, span: Span) {
         self.push(text, span);
         self.text.push(' ');
@@ -123,8 +125,8 @@ impl SourceMap {
         }
     }
 
-    /// The spans of the first and the last token that the byte range touches. A range behind the last token, or between two tokens, is
-    /// taken to the token before it.
+    /// The spans of the first and the last token that the byte range touches. A range after the last token, or between
+    /// two tokens, is assigned to the token before it.
     pub(crate) fn spans(&self, range: Range<usize>) -> (Span, Span) {
         let end = range.end.max(range.start + 1);
         let mut touched = self

@@ -11,13 +11,13 @@ use syn::punctuated::Punctuated;
 use syn::{Attribute, Field, Fields, ItemStruct, Meta, Path, Token, parse_quote};
 use tfe_symbolic::model::declared::{Projection, Variant};
 
-/// The derives that hold of the model made as they hold of the original.
+/// The derives that are copied from the original to the model made from it.
 const DERIVES: [&str; 5] = ["Clone", "Copy", "Debug", "PartialEq", "Default"];
 
-/// The attributes of lints, which hold of the model made and of its fields as of the original.
+/// The lint attributes that are copied from the original to the model made from it, and to its fields.
 const LINTS: [&str; 4] = ["allow", "warn", "deny", "forbid"];
 
-/// The struct, and its methods beside those of any model: `of`, which copies the parameters, and `of_state`.
+/// The struct, and its methods in addition to those of every model: `of`, which copies the parameters, and `of_state`.
 pub(crate) fn expand(
     variant: &Variant,
     original: &ItemStruct,
@@ -85,7 +85,8 @@ fn fields(variant: &Variant, original: &ItemStruct) -> Vec<Field> {
     fields
 }
 
-/// The attribute where it is one of a lint. What is expected of the original may be absent here: an `expect` becomes an `allow`.
+/// The attribute if it is one of a lint. An `expect` becomes an `allow`, because what is expected of the original may
+/// be absent here.
 fn lint(attribute: &Attribute) -> Option<Attribute> {
     let path = attribute.path();
     if let (true, Meta::List(list)) = (path.is_ident("expect"), &attribute.meta) {
@@ -96,7 +97,8 @@ fn lint(attribute: &Attribute) -> Option<Attribute> {
     is_lint.then(|| attribute.clone())
 }
 
-/// `#[derive(…)]` with those of [`DERIVES`] that the original has; those above `#[dynamics]` cannot be seen from here.
+/// `#[derive(…)]` with those of [`DERIVES`] that the original has; derives above `#[dynamics]` cannot be seen from
+/// here.
 fn derives(original: &ItemStruct) -> Option<Attribute> {
     let mut paths: Vec<Path> = Vec::new();
     for attribute in &original.attrs {

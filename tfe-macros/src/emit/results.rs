@@ -1,4 +1,4 @@
-//! Where the results of kernels are written.
+//! The places to which results of kernels are written.
 
 use super::Emitter;
 use crate::indices::index;
@@ -7,7 +7,7 @@ use quote::{format_ident, quote};
 use tfe_symbolic::program::{Array, Place};
 
 impl Emitter<'_> {
-    /// Whether the results of an array are told entry by entry.
+    /// Whether the results of an array are reported entry by entry.
     pub(super) fn is_entry(&self, array: Array) -> bool {
         self.by_entries && block(array).is_some()
     }
@@ -58,7 +58,7 @@ impl Emitter<'_> {
         let matrix = |array: TokenStream| quote!(for row in &mut #array { row.fill(t.like(0.0)); });
         match cleared {
             _ if self.onto_zeros => TokenStream::new(),
-            // They are sums of what is added from the start.
+            // Entries that are sums of reported contributions need not be cleared.
             _ if self.is_entry(cleared) => TokenStream::new(),
             Array::ByZ => vector(quote!(first.z)),
             Array::ByQ => vector(quote!(first.q)),

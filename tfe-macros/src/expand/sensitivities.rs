@@ -51,7 +51,7 @@ impl Kernels<'_> {
         }
     }
 
-    /// `first_by`, with an arm for the time and for each parameter that anything depends on.
+    /// `first_by`, with an arm for the time and for each parameter on which anything depends.
     fn first_by(&self) -> TokenStream {
         let dof = &self.dof;
         let arm = |by: By| {

@@ -1,4 +1,4 @@
-//! The kernels of a model with inputs where none are given.
+//! The kernels of a model with inputs when no inputs are given.
 
 use super::Kernels;
 use crate::controls;
@@ -6,7 +6,8 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 impl Kernels<'_> {
-    /// The kernels of `Model` where those of `Controlled` are given inputs: all of them zero. `lanes` says whether the first derivatives are there for several points at once.
+    /// The kernels of `Model`, which call those of `Controlled` with all inputs zero. `lanes` tells whether the first
+    /// derivatives are available for several points at once.
     pub(super) fn without_inputs(&self, lanes: Option<TokenStream>) -> TokenStream {
         let dof = &self.dof;
         let trait_name = quote!(<Self as __tfe::Controlled<#dof>>);

@@ -8,15 +8,15 @@ use syn::{Data, DeriveInput, Field, Type};
 use tfe_symbolic::expr::ordered::SortedSet;
 use tfe_symbolic::syntax::ast::{Entry, Pass};
 
-/// What can be told of `model(Name, …)`.
+/// What can be guessed about `model(Name, …)`.
 #[derive(Clone)]
 pub(super) struct Variant {
     pub(super) name: Ident,
-    /// How many coordinates it has less, as far as entries name them one by one.
+    /// The number of coordinates that it loses, as far as entries name them one by one.
     gone: usize,
-    /// Whether only cyclic coordinates have gone.
+    /// Whether only cyclic coordinates are removed.
     is_projected: bool,
-    /// The fields that it has more.
+    /// The fields that it has in addition.
     added: SortedSet<String>,
 }
 
@@ -38,7 +38,7 @@ impl Variant {
         }
     }
 
-    /// The number of coordinates that are left of those of the original, one at least.
+    /// The number of remaining coordinates of the original, at least one.
     pub(super) fn left(&self, dof: &TokenStream) -> TokenStream {
         match dof.to_string().parse::<usize>() {
             Ok(all) => {
@@ -50,7 +50,7 @@ impl Variant {
     }
 }
 
-/// The fields of numbers that it may have: those of the original, and those added.
+/// The number fields that it may have: those of the original, and those added.
 fn fields(variant: &Variant, item: &DeriveInput) -> SortedSet<Ident> {
     let own = match &item.data {
         Data::Struct(data) => data.fields.iter().collect(),

@@ -12,7 +12,7 @@ use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::model::declared::Declared;
 use tfe_symbolic::program::{Program, Request};
 
-/// What an implementation of `FamilyModel` holds of constraints: nothing where there are none.
+/// The members for constraints in an implementation of `FamilyModel`; none if there are no constraints.
 pub(super) fn members(
     declared: &Declared,
     derivation: &Derivation,
@@ -65,12 +65,12 @@ impl Kernels<'_> {
         self.derivation.program(request)
     }
 
-    /// The body of a kernel, with its slices cut to their lengths so that the compiler knows them.
+    /// The body of a kernel, with its slices cut to their lengths, so that the compiler knows them.
     fn body(&self, program: &Program) -> TokenStream {
         self.body_by(self.emitter(), program)
     }
 
-    /// The same of a kernel that is differentiated by parameters.
+    /// The same for a kernel that can be differentiated by parameters.
     fn sensitive_body(&self, program: &Program) -> TokenStream {
         let places = self.parameters.places();
         self.body_by(self.emitter().with_run_time_parameters(places), program)

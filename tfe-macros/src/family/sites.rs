@@ -1,4 +1,4 @@
-//! What is declared by site: how many there are in all, and the name of each.
+//! Declarations by site: their total number, and the name of each.
 
 use crate::indices;
 use proc_macro2::TokenStream;
@@ -8,7 +8,7 @@ use tfe_symbolic::expr::graph::SumRange;
 /// A name and the range of its sites; of a single one, no range.
 pub(super) type Sites<'a> = (&'a str, &'a [SumRange]);
 
-/// The number of all of them, which saturates rather than overflows.
+/// The total number, which saturates instead of overflowing.
 pub(super) fn count(all: &[Sites]) -> TokenStream {
     let counts = all.iter().map(|(_, ranges)| match ranges.first() {
         None => quote!(1),

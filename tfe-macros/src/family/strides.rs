@@ -1,4 +1,4 @@
-//! Which kernels run through their sites in one loop, so that they can say how far they have come.
+//! Kernels that run through their sites in a single loop, so that they can report their progress.
 
 use crate::emit::Emitter;
 use crate::indices::{index, less, loop_name};
@@ -10,15 +10,15 @@ use tfe_symbolic::program::{Array, Operand, Program, Statement};
 /// The only loop of a kernel, and the lowest coordinate that a turn touches, counted from the loop's index.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Strides {
-    /// Which of the statements it is.
+    /// The index of the loop among the statements.
     pub(crate) at: usize,
     /// The coordinate i + lowest.
     pub(crate) lowest: i64,
-    /// Whether every place of L_q is written just once: as a value, not as a sum on what is there.
+    /// Whether every entry of L_q is written exactly once, as a value and not as an addition to what is there.
     pub(crate) assigns: bool,
 }
 
-/// None where coordinates are touched in any other order.
+/// `None` if coordinates are visited in another order.
 pub(crate) fn of(program: &Program, coordinates: &Affine) -> Option<Strides> {
     let is_loop = |statement: &Statement| matches!(statement, Statement::Loop { .. });
     let at = program.statements.iter().position(is_loop)?;
@@ -41,12 +41,12 @@ pub(crate) fn of(program: &Program, coordinates: &Affine) -> Option<Strides> {
     let turn = Affine::symbol(IndexSymbol::Loop(*variable));
     let mut places = touched(body).map(|place| beyond(place, &turn));
     let lowest = places.try_fold(i64::MAX, |lowest, place| Some(lowest.min(place?)))?;
-    // What comes after the loop belongs to coordinates that its last turns have left open.
+    // Statements after the loop belong to coordinates that its last turns have not completed.
     let is_behind = |place: &Affine| beyond(place, end).is_some_and(|by| by >= lowest);
     if !(lowest < i64::MAX && touched(after).all(is_behind)) {
         return None;
     }
-    // One place a turn from the first coordinate on, and the last coordinate after the loop.
+    // One entry in each turn, from the first coordinate on, and the last coordinate after the loop.
     let assigns = match (&stored(before)[..], &stored(body)[..], &stored(after)[..]) {
         ([], [turn_place], [last]) => beyond(turn_place, &turn).is_some_and(|by| {
             beyond(start, &Affine::constant(-by)) == Some(0)
@@ -108,7 +108,8 @@ fn read(operand: &Operand) -> Option<&Affine> {
 }
 
 impl Emitter<'_> {
-    /// The body of a kernel that borrows its slices by `lend`, anew after each stride of the loop, and says how far it has come; a short loop is left to `all_at_once`.
+    /// The body of a kernel that borrows its slices by `lend`, anew after each stride of the loop, and reports its
+    /// progress; a short loop is left to `all_at_once`.
     pub(crate) fn in_strides(
         mut self,
         program: &Program,

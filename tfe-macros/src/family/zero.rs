@@ -1,4 +1,4 @@
-//! A family all of whose inputs are zero.
+//! The kernels of a model of run-time length all of whose inputs are zero.
 
 use crate::controls;
 use proc_macro2::TokenStream;
