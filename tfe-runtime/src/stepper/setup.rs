@@ -106,7 +106,8 @@ impl<'m, M, const N: usize> Stepper<'m, M, N>
 where
     M: Model<N>,
 {
-    /// This and the next constants avoid compiling code that a model never uses.
+    /// Whether forces may have kinks. This and the next ones are constants, so that code that a model never uses is not
+    /// compiled.
     pub(super) const MAY_HAVE_KINKS: bool = !M::FACTS.smooth;
     pub(super) const HAS_CONSTRAINTS: bool = !M::CONSTRAINTS.is_empty();
 
