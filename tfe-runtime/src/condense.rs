@@ -7,7 +7,7 @@
 //! δx = X_y δy₀ + X_γ δγ ,     X = −(∂r/∂x)⁻¹ ∂r/∂(y₀, γ) ,     δy₁ = Y_x δx + Y_y δy₀ + Y_γ δγ .
 //! ```
 //!
-//! The rows are solved for x at a given start. The interior block of the boundary-value form of a primal element, which
+//! The rows are solved for x at a given start. The interior block of the nodal form of a primal element, which
 //! is singular at isolated steps, is never inverted.
 
 use crate::dual::{Dual, duals};
