@@ -58,17 +58,22 @@ pub(crate) trait Halving {
     fn passed(&mut self, t: f64, h: f64, kicks: Self::Kicks);
 }
 
-/// Whether a shorter step may succeed where one has failed with `error`.
-pub(crate) fn may_be_cut(error: &StepError, linear: bool, solve: Solve) -> bool {
-    let is_of_the_iteration = matches!(
+/// Whether a step failed because Newton's method found no root, or none that is known to continue the motion: a shorter
+/// step, or one from elsewhere, may succeed.
+pub(crate) fn is_of_newton(error: &StepError) -> bool {
+    matches!(
         error,
         StepError::Unproven { .. }
             | StepError::EnergyJump { .. }
             | StepError::NonFinite
             | StepError::SingularTangent { .. }
             | StepError::NewtonStalled { .. }
-            | StepError::Legendre(_)
-    );
+    )
+}
+
+/// Whether a shorter step may go well where one has failed with `error`.
+pub(crate) fn may_be_cut(error: &StepError, linear: bool, solve: Solve) -> bool {
+    let is_of_the_iteration = is_of_newton(error) || matches!(error, StepError::Legendre(_));
     is_of_the_iteration && !linear && solve.cuts()
 }
 

@@ -8,7 +8,7 @@ mod search;
 mod watched;
 
 use crate::constrained::velocity_of;
-use crate::cut::{Halving, Instant};
+use crate::cut::{Halving, Instant, is_of_newton};
 use crate::error::StepError;
 use crate::model::{Form, Model};
 use alloc::vec::Vec;
@@ -457,14 +457,9 @@ fn slides<S: Kinked>(
 
 /// Whether a shorter arc may succeed.
 fn is_of_the_iteration(error: &StepError) -> bool {
-    matches!(
-        error,
-        StepError::Unproven { .. }
-            | StepError::EnergyJump { .. }
-            | StepError::NonFinite
-            | StepError::SingularTangent { .. }
-            | StepError::NewtonStalled { .. }
-            | StepError::FixedPointStalled { .. }
-            | StepError::Legendre(_)
-    )
+    is_of_newton(error)
+        || matches!(
+            error,
+            StepError::FixedPointStalled { .. } | StepError::Legendre(_)
+        )
 }

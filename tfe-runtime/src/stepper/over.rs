@@ -4,7 +4,7 @@ use super::piece::{Ahead, Piece};
 use super::setup::Stepper;
 use crate::constrained::rows::Independence;
 use crate::constrained::trail::Of;
-use crate::cut::Halving;
+use crate::cut::{Halving, is_of_newton};
 use crate::error::{ConstraintError, StepError};
 use crate::method::Impulse;
 use crate::model::{Model, State};
@@ -39,17 +39,13 @@ fn is_lost(start: &Independence, end: &Independence) -> bool {
 
 /// Whether a step may have failed because the constraints lose rank near its end.
 fn is_of_the_place(error: &StepError) -> bool {
-    matches!(
-        error,
-        StepError::Unproven { .. }
-            | StepError::EnergyJump { .. }
-            | StepError::NonFinite
-            | StepError::SingularTangent { .. }
-            | StepError::NewtonStalled { .. }
-            | StepError::Constraint(
+    is_of_newton(error)
+        || matches!(
+            error,
+            StepError::Constraint(
                 ConstraintError::Dependent { .. } | ConstraintError::SingularMass
             )
-    )
+        )
 }
 
 impl<M, const N: usize> Stepper<'_, M, N>
