@@ -6,8 +6,15 @@ use crate::legendre::{lagrangian_view_from, velocity as free_velocity};
 use crate::lu;
 use crate::model::{First, Form, Model};
 
-/// The largest number of iterations of Newton's method; one suffices where the kinetic energy is quadratic.
-const MOST: u32 = 50;
+/// The largest number of iterations of Newton's method for the velocity of a momentum; one suffices where the energy is
+/// quadratic in z.
+pub(crate) const MOST: u32 = 50;
+
+/// Whether these iterations end: the step is a rounding error of the solution, or it is small and no longer decreases.
+#[inline]
+pub(crate) fn is_settled(step: f64, last: f64, scale: f64) -> bool {
+    step <= 4.0 * f64::EPSILON * scale || (step >= last && step <= 1e-10 * scale)
+}
 
 /// Working memory of [`solve_velocity`]: (N + m)² numbers, N + m numbers, and as many indices.
 pub(crate) struct Bordered<'a> {
@@ -72,8 +79,7 @@ where
         if !v.iter().all(|v| v.is_finite()) {
             return Err(StepError::NonFinite);
         }
-        let settled = step <= 4.0 * f64::EPSILON * scale || (step >= last && step <= 1e-10 * scale);
-        if settled || (M::FACTS.quadratic_in_z && last.is_finite()) {
+        if is_settled(step, last, scale) || (M::FACTS.quadratic_in_z && last.is_finite()) {
             return Ok(v);
         }
         last = step;

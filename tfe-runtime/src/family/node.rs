@@ -4,13 +4,11 @@ use super::blocked::{Blocked, Place};
 use super::model::{Gradient, Model};
 use super::pattern::Pattern;
 use super::rows::Rows;
+use crate::constrained::node::{MOST, is_settled};
 use crate::error::{ConstraintError, LegendreError, StepError};
 use crate::legendre::largest;
 use alloc::vec;
 use alloc::vec::Vec;
-
-/// The largest number of iterations of Newton's method; one suffices where the energy is quadratic in z.
-const MOST: u32 = 50;
 
 /// The number of times a step is halved.
 const MOST_HALVINGS: u32 = 20;
@@ -102,9 +100,7 @@ impl Node {
             if !(step + scale).is_finite() {
                 return Err(StepError::NonFinite);
             }
-            let settled =
-                step <= 4.0 * f64::EPSILON * scale || (step >= last && step <= 1e-10 * scale);
-            if settled || (M::FACTS.quadratic_in_z && last.is_finite()) {
+            if is_settled(step, last, scale) || (M::FACTS.quadratic_in_z && last.is_finite()) {
                 self.slope(model, t, q, z);
                 return Ok(());
             }
