@@ -304,19 +304,8 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         for iteration in 0..self.control.max_iterations {
             self.evaluate(t, h);
             if fresh {
-                let scheme = self.table.view();
-                let element = super::tangent::Element {
-                    scheme: &scheme,
-                    t,
-                    h,
-                    points: &self.points,
-                    start_rows: &self.start_rows,
-                    end_rows: &self.rows.values,
-                };
-                self.parts.fill(&*self.model, &element, &mut self.matrix);
                 self.statistics.tangent_evaluations += self.points.len() as u64;
-                self.matrix.factor()?;
-                self.factored = h;
+                self.factor(t, h)?;
                 self.statistics.factorizations += 1;
             }
             self.residual(h);
@@ -498,6 +487,12 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
 
     /// The factored tangent at the solution of the last step, from t to t + h.
     pub(super) fn linearised(&mut self, t: f64, h: f64) -> Result<Blocked, StepError> {
+        self.factor(t, h)?;
+        Ok(self.matrix.clone())
+    }
+
+    /// Factors the matrix of Newton's method of a step from t to t + h, at the points that were evaluated last.
+    fn factor(&mut self, t: f64, h: f64) -> Result<(), StepError> {
         let scheme = self.table.view();
         let element = super::tangent::Element {
             scheme: &scheme,
@@ -510,7 +505,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         self.parts.fill(&*self.model, &element, &mut self.matrix);
         self.matrix.factor()?;
         self.factored = h;
-        Ok(self.matrix.clone())
+        Ok(())
     }
 
     /// The solution of the last step, from t to t + h.
