@@ -3,7 +3,7 @@
 use super::rows::{Rows, norm};
 
 /// A velocity that moves less than this fraction of the positions in one step counts as rest.
-const REST: f64 = 1e-5;
+pub(crate) const REST: f64 = 1e-5;
 
 /// The relative violation, by positions and by velocities, of a constraint that has been evaluated: the distance |φ| /
 /// |A| relative to the positions, and |A v + a| / |A| relative to the velocities that matter in a step of length h.

@@ -22,6 +22,7 @@ use super::rows::Rows;
 use super::start::violated;
 use super::tangent::Parts;
 use crate::constrained::element::slopes;
+use crate::constrained::residual::REST;
 use crate::control::START_TOLERANCE;
 use crate::double_double::DoubleDouble;
 use crate::equations::{Increment, relative};
@@ -35,9 +36,6 @@ use crate::statistics::Statistics;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Deref;
-
-/// A velocity that moves less than this fraction of the positions in one step counts as rest.
-const REST: f64 = 1e-5;
 
 /// A stepper of this kind.
 #[derive(Clone, Debug)]
