@@ -2,8 +2,8 @@
 
 use crate::error::RunErrorKind;
 use crate::motion::{
-    LEAST_ROUNDINGS, breaks_within, count_steps, direction_of, is_same_time, leads_to_end,
-    sort_times,
+    LEAST_ROUNDINGS, MOST_STEPS, breaks_within, count_steps, direction_of, is_same_time,
+    leads_to_end, sort_times,
 };
 use std::ops::Range;
 
@@ -341,12 +341,9 @@ fn single_steps(nodes: &[f64]) -> Vec<Segment> {
 }
 
 impl Segment {
-    /// A count of steps beyond this is a mistake in units rather than a run: it would take years.
-    const MOST_STEPS: f64 = 1e15;
-
     fn new(start: f64, end: f64, step: f64) -> Result<Self, RunErrorKind> {
         let ratio = (end - start) / step;
-        if !(ratio <= Self::MOST_STEPS) {
+        if !(ratio <= MOST_STEPS) {
             return Err(RunErrorKind::TooManySteps {
                 span: end - start,
                 step,

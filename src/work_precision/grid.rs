@@ -1,7 +1,7 @@
 //! The nodes of one run.
 
 use super::error::WorkPrecisionError;
-use crate::motion::count_steps;
+use crate::motion::{MOST_STEPS, count_steps};
 use std::ops::Range;
 
 /// A span in equal steps; the last one may be shorter.
@@ -30,8 +30,6 @@ pub(super) struct Look {
 const COMPARED: usize = 10;
 /// At how many nodes the energy is evaluated, at most: a fraction of the run that does not count.
 const LOOKS: usize = 1000;
-/// A count of steps beyond this is a mistake in units rather than a run.
-const MOST_STEPS: f64 = 1e15;
 
 impl Grid {
     pub(crate) fn new(span: &Range<f64>, step: f64) -> Result<Self, WorkPrecisionError> {
