@@ -7,6 +7,7 @@ use super::orbit::sort;
 use super::phase::Period;
 use super::sensitive::{OrbitSlopes, SensitiveOrbit};
 use crate::differences::places;
+use crate::numbers::largest;
 use crate::periodic_schur::Multiplier;
 use nalgebra::DVector;
 use tfe_runtime::{Model, State};
@@ -99,7 +100,6 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
         let (start, period) = (orbit.start(), orbit.period());
         let value = parameter.map_or(period, |index| model.parameter(index));
         let scales = scales(orbit.motion());
-        let largest = |all: &[f64; N]| all.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         let parts = [
             largest(&by_start.q) / scales.q,
             largest(&by_start.p) / scales.p,

@@ -1,7 +1,7 @@
 //! How multipliers move with a parameter (T-157).
 
 use crate::differences::{NEARER, PART, WELL_KNOWN, is_next_to_zero, places};
-use crate::numbers::larger;
+use crate::numbers::largest;
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
 use std::f64::consts::PI;
@@ -36,7 +36,6 @@ pub(super) fn distances(value: f64, parts: [f64; 3]) -> Vec<f64> {
 
 /// The largest of some changes, in parts of the largest of what changes; zero where that is.
 pub(super) fn part(changes: &[f64], of: &[f64]) -> f64 {
-    let largest = |all: &[f64]| all.iter().fold(0.0, |most, x| larger(most, x.abs()));
     let size = largest(of);
     if size > 0.0 {
         largest(changes) / size
