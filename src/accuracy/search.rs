@@ -9,7 +9,7 @@ mod runs;
 use super::estimated::Picked;
 use super::trace::difference;
 use crate::error::RunErrorKind;
-use cuts::cuts;
+use cuts::{again, cuts};
 use ladder::{Ladder, Verdict};
 use probe::probe;
 use runs::{
@@ -263,12 +263,7 @@ fn climb(
         return Err(failure.unwrap_or(RunErrorKind::Step { step }));
     };
     let mut attempts = ladder.attempts;
-    let mut extremes = (step, step);
-    for attempt in &mut attempts {
-        way.step = attempt.step * (1.0 + 4.0 * f64::EPSILON);
-        extremes = way.extremes();
-        attempt.step = extremes.1;
-    }
+    let extremes = way.measure(&mut attempts);
     Ok(Climbed::Found(Box::new(Found {
         is_met,
         picked: Picked {
@@ -303,7 +298,7 @@ fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut dyn Runner) 
     let better = Way {
         element: next(way.element)?,
         tolerance: (VERIFIED * way.tolerance).max(TIGHTEST),
-        step: taken * (1.0 + 4.0 * f64::EPSILON),
+        step: again(taken),
         keeps: false,
         ..way.clone()
     };

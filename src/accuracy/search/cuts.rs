@@ -1,5 +1,6 @@
 //! Where runs are compared, and how long steps are between.
 
+use super::super::estimated::Attempt;
 use super::super::grading::Grading;
 use super::super::pilot::corners;
 use super::runs::{Asked, MOST_TIMES, STEPS_BETWEEN, Way};
@@ -45,8 +46,19 @@ impl Way<'_> {
         nodes
     }
 
+    /// Gives attempts their longest steps in the units of time, where they have those that they [took](Self::taken); the shortest and the longest step of the last one.
+    pub(super) fn measure(&mut self, attempts: &mut [Attempt]) -> (f64, f64) {
+        let mut extremes = (self.step, self.step);
+        for attempt in attempts {
+            self.step = again(attempt.step);
+            extremes = self.extremes();
+            attempt.step = extremes.1;
+        }
+        extremes
+    }
+
     /// The shortest and the longest step in the units of time.
-    pub(super) fn extremes(&self) -> (f64, f64) {
+    fn extremes(&self) -> (f64, f64) {
         let wider = |(least, most): (f64, f64), length: f64| (least.min(length), most.max(length));
         let none = (f64::INFINITY, 0.0);
         match self.grading {
@@ -62,6 +74,11 @@ impl Way<'_> {
             }
         }
     }
+}
+
+/// The longest step to ask for where so long ones are to be [taken](Way::taken) again: with one that is shorter by a rounding parts would have one more.
+pub(super) fn again(taken: f64) -> f64 {
+    taken * (1.0 + 4.0 * f64::EPSILON)
 }
 
 /// Start, times of comparison with breaks among them, end.

@@ -270,12 +270,7 @@ pub(super) fn climb(
     let Some((times, errors, is_met)) = errors else {
         return Err(failure.unwrap_or(RunErrorKind::Step { step: way.step }));
     };
-    let mut extremes = (way.step, way.step);
-    for attempt in &mut attempts {
-        way.step = attempt.step * (1.0 + 4.0 * f64::EPSILON);
-        extremes = way.extremes();
-        attempt.step = extremes.1;
-    }
+    let extremes = way.measure(&mut attempts);
     Ok(Some(Climbed::Found(Box::new(Found {
         is_met,
         picked: Picked {
