@@ -13,8 +13,8 @@ use cuts::{again, cuts};
 use ladder::{Ladder, Verdict};
 use probe::probe;
 use runs::{
-    AIM, COARSER, Climbed, FIRST, ITERATION, LEAST_FACTOR, LEFT, LONGER, MOST_FACTOR, MOST_RUNS,
-    MOST_STEPS, ROUGH, TIGHTEST, largest,
+    AIM, COARSER, Climbed, FIRST, LEAST_FACTOR, LEFT, LONGER, MOST_FACTOR, MOST_RUNS, MOST_STEPS,
+    TIGHTEST, largest,
 };
 pub(crate) use runs::{
     Asked, Beside, Failed, Found, Graded, Judge, Pilot, Ran, RanBeside, Runner, Way, next,
@@ -209,10 +209,7 @@ fn climb(
     let mut way = Way { cuts: &cuts, ..way };
     let element = way.element;
     let (length, longest) = way.lengths(asked);
-    way.tolerance = ITERATION * asked.accuracy / (length / step).max(1.0);
-    if asked.accuracy > ROUGH {
-        way.tolerance = way.tolerance.max(1.1e-3 * ROUGH);
-    }
+    way.tolerance = asked.tolerance(length / step);
     way.step = (COARSER * step).min(longest).min(way.step);
     let mut ladder = Ladder::new(element, asked.accuracy, way.grading.is_some());
     let mut failure = None;

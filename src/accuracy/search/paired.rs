@@ -8,8 +8,8 @@ use super::super::estimated::{Attempt, Picked};
 use super::super::pilot::corners;
 use super::super::trace::difference;
 use super::runs::{
-    AIM, Asked, Beside, Climbed, FIRST, Found, ITERATION, MOST_RUNS, RESOLVED, ROUGH, ROUNDINGS,
-    Runner, TIGHTEST, Way, largest, next,
+    AIM, Asked, Beside, Climbed, FIRST, Found, MOST_RUNS, RESOLVED, ROUNDINGS, Runner, TIGHTEST,
+    Way, largest, next,
 };
 use crate::error::RunErrorKind;
 use crate::numbers::larger;
@@ -200,11 +200,7 @@ pub(super) fn climb(
         judge.most_longer = (MOST_LONGER.min(longest / way.step)).min((too_long / way.step).sqrt());
         (judge.error, judge.done) = (0.0, 0.0);
         judge.passed.clear();
-        way.tolerance = ITERATION * asked.accuracy / (length / way.step).max(1.0);
-        if asked.accuracy > ROUGH {
-            way.tolerance = way.tolerance.max(1.1e-3 * ROUGH);
-        }
-        way.tolerance = (tightened * way.tolerance).max(TIGHTEST);
+        way.tolerance = (tightened * asked.tolerance(length / way.step)).max(TIGHTEST);
         let other = Way {
             element: better,
             tolerance: (LEFT_BESIDE * way.tolerance).max(TIGHTEST),

@@ -29,6 +29,18 @@ pub(crate) struct Asked {
     pub(crate) in_pairs: bool,
 }
 
+impl Asked {
+    /// What the iteration of each of so many steps may leave.
+    pub(super) fn tolerance(&self, steps: f64) -> f64 {
+        let tolerance = ITERATION * self.accuracy / steps.max(1.0);
+        if self.accuracy > ROUGH {
+            tolerance.max(1.1e-3 * ROUGH)
+        } else {
+            tolerance
+        }
+    }
+}
+
 /// What a pilot run has found.
 #[derive(Clone, Debug)]
 pub(crate) struct Graded {
@@ -145,11 +157,11 @@ pub(crate) struct Found {
 }
 
 /// What errors of the iteration may be of what is asked, all steps together: what they leave has the same sign in step after step.
-pub(super) const ITERATION: f64 = 0.1;
+const ITERATION: f64 = 0.1;
 /// Iterations do not end earlier with less.
 pub(super) const TIGHTEST: f64 = 1e-17;
 /// Above it roundings do not show, and what they take needs not be carried along.
-pub(super) const ROUGH: f64 = 0.99e-11;
+const ROUGH: f64 = 0.99e-11;
 /// A first step longer than the second one by this factor costs two thirds of it.
 pub(super) const COARSER: f64 = 1.5;
 /// A comparison with a run of an error above this says nothing about one with shorter steps.
