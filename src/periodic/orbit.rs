@@ -3,7 +3,7 @@
 use super::error::OrbitError;
 use super::kind::{Chained, Closed};
 use super::problem::{Global, Periodic};
-use crate::assembly::{Assembly, Iterate, Solution};
+use crate::assembly::{Assembly, Iterate};
 use crate::constraints::reduced;
 use crate::length::FixedLength;
 use crate::motion::{Motion, Node};
@@ -102,18 +102,7 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
     ) -> Result<Self, OrbitError> {
         let transitions = assembly.transitions().to_vec();
         let floquet = multipliers_of(problem, &iterate.nodes, &transitions)?;
-        let solution = Solution {
-            model: problem.model,
-            element,
-            mesh: problem.mesh.clone(),
-            start: problem.start,
-            length: problem.period,
-            end: problem.start + problem.period,
-            damping: problem.unfolding,
-            iterate,
-            transitions,
-            statistics: assembly.statistics(),
-        };
+        let solution = problem.solution(element, iterate, transitions, assembly.statistics());
         let unfolded = problem.globals.contains(&Global::Unfolding);
         let (trivial, unfolding) = (problem.trivial(), unfolded.then_some(problem.unfolding));
         Ok(Self::of_solution(solution, floquet, trivial, unfolding))

@@ -2,11 +2,13 @@
 
 use super::error::OrbitError;
 use super::phase::Phase;
-use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem};
+use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem, Solution};
 use crate::numbers::norm;
 use tfe_runtime::condenser::Direction;
 use tfe_runtime::dual::{Dual, duals};
-use tfe_runtime::{First, Form, LegendreError, Model, State, StepError, constrained, legendre};
+use tfe_runtime::{
+    Element, First, Form, LegendreError, Model, State, Statistics, StepError, constrained, legendre,
+};
 
 /// What the global unknowns of an orbit are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +47,30 @@ pub(crate) struct Periodic<'m, M, const N: usize> {
     pub(crate) phase: Option<Phase>,
     /// The energy at the start.
     pub(crate) energy: Option<f64>,
+}
+
+impl<'m, M, const N: usize> Periodic<'m, M, N> {
+    /// The elements of an iterate over the period, with their transition matrices, as far as these are known, and what they have cost.
+    pub(crate) fn solution(
+        &self,
+        element: Element,
+        iterate: Iterate<N>,
+        transitions: Vec<f64>,
+        statistics: Statistics,
+    ) -> Solution<'m, M, N> {
+        Solution {
+            model: self.model,
+            element,
+            mesh: self.mesh.clone(),
+            start: self.start,
+            length: self.period,
+            end: self.start + self.period,
+            damping: self.unfolding,
+            iterate,
+            transitions,
+            statistics,
+        }
+    }
 }
 
 impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {

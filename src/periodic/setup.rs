@@ -6,7 +6,7 @@ use super::orbit::Orbit;
 use super::phase::{Period, Phase};
 use super::problem::{Global, Periodic, inertia_of};
 use super::rest::{Extent, is_at_rest, may_rest};
-use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, Solution};
+use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh};
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Motion;
 use crate::simulation::Simulation;
@@ -366,18 +366,8 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 
     /// The motion of an iterate, with the polynomials of its elements.
     fn motion_of(&self, problem: &Periodic<'_, M, N>, iterate: &Iterate<N>) -> Motion<N> {
-        let solution = Solution {
-            model: problem.model,
-            element: self.element,
-            mesh: problem.mesh.clone(),
-            start: problem.start,
-            length: problem.period,
-            end: problem.start + problem.period,
-            damping: problem.unfolding,
-            iterate: iterate.clone(),
-            transitions: Vec::new(),
-            statistics: Statistics::NONE,
-        };
+        let iterate = iterate.clone();
+        let solution = problem.solution(self.element, iterate, Vec::new(), Statistics::NONE);
         solution.motion()
     }
 
