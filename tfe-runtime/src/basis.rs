@@ -89,6 +89,19 @@ pub fn shape_slopes(nodes: &[f64], tau: f64, slopes: &mut [f64]) {
     }
 }
 
+/// P_{j+1} at x from P_j and P_{j−1}, in twice the precision: (j + 1) P_{j+1} = (2j + 1) x P_j − j P_{j−1}.
+pub(crate) const fn next_legendre(
+    j: usize,
+    x: DoubleDouble,
+    value: DoubleDouble,
+    before: DoubleDouble,
+) -> DoubleDouble {
+    DoubleDouble::integer(2 * j + 1)
+        .times(x.times(value))
+        .minus(DoubleDouble::integer(j).times(before))
+        .over(DoubleDouble::integer(j + 1))
+}
+
 /// P_j in twice the precision, for all j below the length of `values`.
 pub(crate) const fn exact_legendre(tau: DoubleDouble, values: &mut [DoubleDouble]) {
     let x = tau.plus(tau).minus(DoubleDouble::ONE);
@@ -96,10 +109,7 @@ pub(crate) const fn exact_legendre(tau: DoubleDouble, values: &mut [DoubleDouble
     let mut j = 0;
     while j < values.len() {
         values[j] = value;
-        let next = DoubleDouble::integer(2 * j + 1)
-            .times(x.times(value))
-            .minus(DoubleDouble::integer(j).times(before))
-            .over(DoubleDouble::integer(j + 1));
+        let next = next_legendre(j, x, value, before);
         before = value;
         value = next;
         j += 1;

@@ -3,6 +3,7 @@
 //! Nodes are found by Newton's method on Legendre polynomials in twice the working precision. Every function is
 //! `const`, so that a solver for one element holds its rule as a constant.
 
+use crate::basis::next_legendre;
 use crate::double_double::DoubleDouble;
 
 /// The largest number of points of a rule.
@@ -217,11 +218,7 @@ impl Legendre {
         let (mut before, mut value) = (DoubleDouble::ZERO, DoubleDouble::ONE);
         let mut j = 0;
         while j < degree {
-            // (j + 1) P_{j+1} = (2j + 1) x P_j − j P_{j−1}
-            let next = DoubleDouble::integer(2 * j + 1)
-                .times(x.times(value))
-                .minus(DoubleDouble::integer(j).times(before))
-                .over(DoubleDouble::integer(j + 1));
+            let next = next_legendre(j, x, value, before);
             before = value;
             value = next;
             j += 1;
