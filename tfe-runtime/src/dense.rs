@@ -8,7 +8,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
-use crate::method::{Interval, Last};
+use crate::method::{Interval, Last, rounding_of_times};
 use crate::model::State;
 use crate::quadrature::Quadrature;
 use crate::scheme::{MAX_RATES, SchemeRef};
@@ -354,10 +354,8 @@ impl<const N: usize> DenseElement<N> {
 /// The length of an element between two times that was made by the step `h`. It is the step if the difference of the
 /// times agrees with it up to rounding, which is a large part of a short step far from t = 0.
 pub(crate) fn length((start, end): (f64, f64), h: f64) -> f64 {
-    // Steps may begin and end a few rounding errors before breakpoints.
-    let rounding = 16.0 * f64::EPSILON * start.abs().max(end.abs()).max(h.abs());
     let between = end - start;
-    if (between - h).abs() <= rounding {
+    if (between - h).abs() <= rounding_of_times((start, end), h) {
         h
     } else {
         between

@@ -52,8 +52,8 @@ impl<const N: usize> Interval<'_, N> {
     #[cfg(feature = "alloc")]
     pub(crate) fn node_or_place(&self, impulse: &Impulse<N>) -> f64 {
         let (end, tau) = (self.start + self.length, self.place(impulse));
-        let largest = self.start.abs().max(end.abs()).max(self.length.abs());
-        let rounding = (16.0 * f64::EPSILON * largest / self.length.abs()).min(0.25);
+        let rounding = rounding_of_times((self.start, end), self.length) / self.length.abs();
+        let rounding = rounding.min(0.25);
         if tau <= rounding {
             0.0
         } else if 1.0 - tau <= rounding {
@@ -62,6 +62,13 @@ impl<const N: usize> Interval<'_, N> {
             tau
         }
     }
+}
+
+/// The bound of the rounding errors of the times of an element. Steps may begin and end a few rounding errors before
+/// breakpoints.
+#[cfg(feature = "alloc")]
+pub(crate) fn rounding_of_times((start, end): (f64, f64), h: f64) -> f64 {
+    16.0 * f64::EPSILON * start.abs().max(end.abs()).max(h.abs())
 }
 
 /// What is carried from step to step in addition to the [`Workspace`](crate::workspace::Workspace).
