@@ -82,7 +82,7 @@ where
         F: Fn(usize, Result<Node<0, RunTimeLength>, RunErrorKind>) + Send + Sync,
     {
         let count = self.models.count(starts.len())?;
-        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        let step = self.step_over(&span);
         Mesh::<0>::new(&span, step, &self.breaks, &[])?;
         self.element.validate().map_err(RunErrorKind::Element)?;
         let progress = Progress::new(self.progress, count, "runs");

@@ -7,7 +7,7 @@ use super::plan::{Plan, WIDTH, bad_starts, start_of};
 use super::results::{Results, lock, summed, unlock};
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
-use crate::motion::Node;
+use crate::motion::{Node, default_step};
 use crate::progress::Progress;
 use crate::simulation::Watching;
 use crate::simulation::mesh::Mesh;
@@ -131,6 +131,11 @@ impl<M, const N: usize, K, L: Length<N>> Ensemble<'_, M, N, K, L> {
             at_kinks: false,
             progress: false,
         }
+    }
+
+    /// The step size of runs over a span.
+    pub(super) fn step_over(&self, span: &Range<f64>) -> f64 {
+        self.step.unwrap_or_else(|| default_step(span))
     }
 
     /// Sets the element: `Mixed::<6>`, `Radau::<3>`, `Element::mixed(n)`, …
@@ -284,7 +289,7 @@ where
         F: Fn(usize, Result<Node<N>, RunErrorKind>) + Send + Sync,
     {
         let count = self.models.count(starts.len())?;
-        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        let step = self.step_over(&span);
         let mesh = Mesh::new(&span, step, &self.breaks, &[])?;
         self.element.validate().map_err(RunErrorKind::Element)?;
         let plan = Plan {

@@ -66,7 +66,7 @@ where
     where
         M: Declared<N, Length = L>,
     {
-        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        let step = self.step_over(span);
         let run = self.simulation(model, step);
         outcome(model, &run.run(start.clone(), span.clone()))
     }

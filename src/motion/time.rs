@@ -36,6 +36,11 @@ pub(crate) fn looked_at(times: impl IntoIterator<Item = f64>, known: &[f64]) -> 
 /// A count of steps beyond this is a mistake in units rather than a run: it would take years.
 pub(crate) const MOST_STEPS: f64 = 1e15;
 
+/// The step of a run that is given none.
+pub(crate) fn default_step(span: &Range<f64>) -> f64 {
+    (span.end - span.start).abs() / 1000.0
+}
+
 /// How many steps there are in a span, whose sign the step has, and whether the last one is as long as the others: but for a rounding of the quotient, as 10 / 0.01 may be
 /// 1000.0000000000001, or of the times, which far from zero is more. Such a rounding is no step of its own: it may be no time at all.
 pub(crate) fn count_steps(span: &Range<f64>, step: f64) -> (f64, bool) {

@@ -2,7 +2,7 @@
 
 use super::times::{Elements, Times, check_span, ends};
 use crate::error::RunErrorKind;
-use crate::motion::direction_of;
+use crate::motion::{default_step, direction_of};
 use std::ops::Range;
 use tfe_runtime::step::Impulse;
 
@@ -24,7 +24,7 @@ impl<I> Grid<'_, I> {
         if let Some(nodes) = self.nodes {
             return Mesh::through(span, nodes, self.breaks, impulses);
         }
-        let step = self.step.unwrap_or((span.end - span.start).abs() / 1000.0);
+        let step = self.step.unwrap_or_else(|| default_step(span));
         Mesh::new(span, step, self.breaks, impulses)
     }
 }
