@@ -4,7 +4,7 @@ use super::ends::Ends;
 use super::error::EnsembleError;
 use super::members::Models;
 use super::plan::start_of;
-use super::results::{Results, lock, summed, unlock};
+use super::results::{Results, lock, unlock};
 use super::setup::Ensemble;
 use crate::error::RunErrorKind;
 use crate::length::RunTimeLength;
@@ -86,16 +86,6 @@ where
         Mesh::<0>::new(&span, step, &self.breaks, &[])?;
         self.element.validate().map_err(RunErrorKind::Element)?;
         let progress = Progress::new(self.progress, count, "runs");
-        Ok(summed(
-            count,
-            || (),
-            |_: &mut (), index| {
-                let (model, start) = (self.models.model(index), start_of(starts, index));
-                let (result, statistics) = self.run_one(model, start, &span);
-                finished(index, result);
-                progress.advance(1);
-                statistics
-            },
-        ))
+        Ok(self.run_one_by_one(starts, &span, (count, &progress), finished))
     }
 }

@@ -306,18 +306,7 @@ where
             return Ok(Statistics::default());
         }
         let statistics = if self.is_watched() {
-            summed(
-                count,
-                || (),
-                |_: &mut (), index| {
-                    let start = start_of(starts, index);
-                    let model = self.models.model(index);
-                    let (result, statistics) = self.run_one(model, start, &span);
-                    finished(index, result);
-                    progress.advance(1);
-                    statistics
-                },
-            )
+            self.run_one_by_one(starts, &span, (count, &progress), finished)
         } else if plan.width == WIDTH {
             // Made once, and one batch after the other runs in a copy.
             let empty = self.models.bundle(self.element, self.control);

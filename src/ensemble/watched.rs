@@ -2,11 +2,15 @@
 
 use super::doubts::{Energy, WarningCounts};
 use super::ends::Outcome;
+use super::members::Models;
+use super::plan::start_of;
+use super::results::summed;
 use super::setup::Ensemble;
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{Declared, Length};
 use crate::motion::{Motion, Node};
+use crate::progress::Progress;
 use crate::simulation::{Act, Crossing, Occurrence, Settable, Simulated, Simulation};
 use std::ops::Range;
 use tfe_runtime::Statistics;
@@ -53,11 +57,39 @@ where
 
 impl<'m, M, const N: usize, K, L> Ensemble<'m, M, N, K, L>
 where
+    M: Simulated<N, L> + Declared<N, Length = L> + Sync,
+    K: Models<'m, M>,
+    L: Length<N>,
+{
+    /// So many runs, each by itself, on all processors; what they have cost together.
+    pub(super) fn run_one_by_one(
+        &self,
+        starts: &[L::State],
+        span: &Range<f64>,
+        (count, progress): (usize, &Progress),
+        finished: impl Fn(usize, Outcome<N, L>) + Send + Sync,
+    ) -> Statistics {
+        summed(
+            count,
+            || (),
+            |_: &mut (), index| {
+                let (model, start) = (self.models.model(index), start_of(starts, index));
+                let (result, statistics) = self.run_one(model, start, span);
+                finished(index, result);
+                progress.advance(1);
+                statistics
+            },
+        )
+    }
+}
+
+impl<'m, M, const N: usize, K, L> Ensemble<'m, M, N, K, L>
+where
     M: Simulated<N, L>,
     L: Length<N>,
 {
     /// One run as a [`Simulation`] makes it, with its events and kinks.
-    pub(super) fn run_one(
+    fn run_one(
         &self,
         model: &'m M,
         start: &L::State,
