@@ -59,6 +59,16 @@ pub fn word(value: &Value) -> &str {
         .unwrap_or_else(|| panic!("{value} is not a word"))
 }
 
+/// The case of this name in a table.
+pub fn case(table: &str, name: &str) -> Value {
+    let cases = reference(table);
+    let mut cases = list(&cases["cases"]).iter();
+    let found = cases.find(|case| word(&case["name"]) == name);
+    found
+        .unwrap_or_else(|| panic!("{table} has no case {name}"))
+        .clone()
+}
+
 /// A matrix given by its rows.
 pub fn matrix(value: &Value) -> DMatrix<f64> {
     let rows: Vec<Vec<f64>> = list(value).iter().map(numbers).collect();

@@ -1,9 +1,8 @@
 //! Bodies in space: unit quaternions, Euler angles and rotation matrices say the same.
 
-use crate::common::{assert_close, list, number, numbers, reference, word};
+use crate::common::{assert_close, case, list, number, numbers};
 use crate::models::{QuaternionTop, axes, rate};
 use crate::runs::run;
-use serde_json::Value;
 use tfe::prelude::*;
 
 /// The symmetric top in 3-1-3 Euler angles.
@@ -151,11 +150,7 @@ fn a_ball_joint_holds_a_body() {
 
 /// Body rates and attitude at the times of the table.
 fn check_trajectory(name: &str, body: &QuaternionTop, element: Element, step: f64) {
-    let table = reference("trajectories");
-    let case: &Value = list(&table["cases"])
-        .iter()
-        .find(|case| word(&case["name"]) == name)
-        .expect("the case is in the table");
+    let case = case("trajectories", name);
     let initial = numbers(&case["initial"]);
     let start = body.moving(
         initial[3..].try_into().expect("a quaternion"),

@@ -1,6 +1,6 @@
 //! Orbits and multipliers against `tests/reference/periodic.json` and closed forms.
 
-use crate::common::{list, number, numbers, reference, word};
+use crate::common::{case, list, number, numbers};
 use crate::models::{
     Blade, Duffing, HenonHeiles, Mathieu, Pendulum, Shaft, TurningSaddle, VanDerPol,
 };
@@ -9,14 +9,6 @@ use serde_json::Value;
 use std::f64::consts::{PI, TAU};
 use tfe::periodic::{Orbit, Phase, Verdict};
 use tfe::prelude::*;
-
-fn case(name: &str) -> Value {
-    let table = reference("periodic");
-    let found = list(&table["cases"])
-        .iter()
-        .find(|case| word(&case["name"]) == name);
-    found.unwrap_or_else(|| panic!("no case {name}")).clone()
-}
 
 /// Reference multipliers, the largest modulus first, the one with the positive imaginary part first of a pair.
 fn expected(case: &Value) -> Vec<Complex<f64>> {
@@ -70,7 +62,7 @@ fn limit_cycle(model: &VanDerPol, element: Element, elements: usize) -> Orbit<'_
 
 #[test]
 fn van_der_pol() {
-    let case = case("van_der_pol_mu1");
+    let case = case("periodic", "van_der_pol_mu1");
     let model = VanDerPol { mu: 1.0 };
     for (element, elements) in [
         (Element::mixed(8), 40),
@@ -124,7 +116,7 @@ fn the_phase_is_that_of_the_guess_unless_one_is_chosen() {
 
 #[test]
 fn forced_duffing() {
-    let case = case("duffing_forced");
+    let case = case("periodic", "duffing_forced");
     let model = Duffing {
         alpha: 1.0,
         beta: 1.0,
@@ -186,7 +178,7 @@ fn flapping_blades() {
             },
         ),
     ] {
-        let case = case(name);
+        let case = case("periodic", name);
         let orbit = PeriodicOrbit::of(&blade)
             .element(Mixed::<8>)
             .elements(32)
@@ -213,7 +205,7 @@ fn mathieu() {
             .solve()
             .expect("the zero solution");
         assert_eq!(orbit.start(), model.state([0.0], [0.0]));
-        assert_multipliers(&orbit, &expected(&case(name)), 1e-12);
+        assert_multipliers(&orbit, &expected(&case("periodic", name)), 1e-12);
         assert_eq!(orbit.is_stable(), a == 2.0);
         assert!(stability::symplecticity_defect(&orbit.monodromy()) < 1e-12);
     }

@@ -1,6 +1,6 @@
 //! Trajectories against 32-digit references: observed orders in q and in p, and the best error.
 
-use crate::common::{distance, larger, list, number, numbers, observed_order, reference, word};
+use crate::common::{case, distance, larger, list, number, numbers, observed_order};
 use crate::models::{DoublePendulum, EulerTop, HenonHeiles, Kepler, Pendulum, RigidBody};
 use tfe::prelude::*;
 
@@ -11,13 +11,9 @@ struct Reference<const N: usize> {
     time: f64,
 }
 
-/// The state of the table `case` at its `index`-th time; the table lists (q…, p…).
-fn phase_reference<const N: usize>(case: &str, index: usize) -> Reference<N> {
-    let table = reference("trajectories");
-    let case = list(&table["cases"])
-        .iter()
-        .find(|c| word(&c["name"]) == case)
-        .expect("the case is in the table");
+/// The state of the case `name` at its `index`-th time; the table lists (q…, p…).
+fn phase_reference<const N: usize>(name: &str, index: usize) -> Reference<N> {
+    let case = case("trajectories", name);
     let state = |values: &[f64]| State {
         q: values[..N].try_into().expect("N coordinates"),
         p: values[N..].try_into().expect("N momenta"),
@@ -277,12 +273,8 @@ fn best_errors() {
 }
 
 /// Body rates and attitude of a rigid body at the times of the table.
-fn check_body(case: &str, body: &RigidBody, element: Element, step: f64, tolerance: f64) {
-    let table = reference("trajectories");
-    let case = list(&table["cases"])
-        .iter()
-        .find(|c| word(&c["name"]) == case)
-        .expect("the case is in the table");
+fn check_body(name: &str, body: &RigidBody, element: Element, step: f64, tolerance: f64) {
+    let case = case("trajectories", name);
     let initial = numbers(&case["initial"]);
     let start = body.moving(
         initial[3..].try_into().expect("a quaternion"),
@@ -340,11 +332,7 @@ fn the_heavy_top_in_quaternions() {
 
 #[test]
 fn the_heavy_top_in_euler_angles() {
-    let table = reference("trajectories");
-    let case = list(&table["cases"])
-        .iter()
-        .find(|c| word(&c["name"]) == "heavy_top")
-        .expect("the top is in the table");
+    let case = case("trajectories", "heavy_top");
     let top = EulerTop {
         jt: 1.0,
         ja: 0.5,
