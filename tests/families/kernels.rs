@@ -1,5 +1,6 @@
 //! The kernels of families: against those of the same model of fixed size, against differences, and their patterns.
 
+use std::collections::BTreeMap;
 use tfe::Model;
 use tfe::family::{self, Block, Entries, Gradient, Model as _, Pattern};
 use tfe::prelude::dynamics;
@@ -43,7 +44,7 @@ fn models() -> (Long, Five) {
 
 /// Dense blocks, for comparison.
 #[derive(Default)]
-struct Dense(std::collections::BTreeMap<(Block, usize, usize), f64>);
+pub(crate) struct Dense(pub(crate) BTreeMap<(Block, usize, usize), f64>);
 
 impl Entries<f64> for Dense {
     fn add(&mut self, block: Block, row: usize, column: usize, value: f64) {

@@ -1,8 +1,8 @@
 //! Lists of indices: networks that are known at run time only.
 
-use std::collections::BTreeMap;
+use crate::kernels::Dense;
 use tfe::RunErrorKind;
-use tfe::family::{self, Block, Entries, Gradient, Model as _};
+use tfe::family::{self, Block, Gradient, Model as _};
 use tfe::prelude::*;
 
 #[dynamics(
@@ -34,15 +34,6 @@ fn network() -> Network {
 
 const Q: [f64; 4] = [0.3, -0.2, 0.8, 0.1];
 const V: [f64; 4] = [0.1, 0.5, -0.4, 0.2];
-
-#[derive(Default)]
-struct Dense(BTreeMap<(Block, usize, usize), f64>);
-
-impl Entries<f64> for Dense {
-    fn add(&mut self, block: Block, row: usize, column: usize, value: f64) {
-        *self.0.entry((block, row, column)).or_default() += value;
-    }
-}
 
 /// L_q and the entries of all second derivatives.
 fn derivatives(model: &Network, q: &[f64]) -> ([f64; 4], Dense) {
