@@ -1,6 +1,7 @@
 //! Transition matrices along a motion.
 
 use crate::common::assert_close;
+use crate::derivative::difference;
 use nalgebra::DMatrix;
 use tfe::RunErrorKind;
 use tfe::periodic_schur::Multiplier;
@@ -28,25 +29,6 @@ fn elements() -> [Element; 6] {
     ]
 }
 
-/// The derivative of the end of a run by its start, in the order (p, q), by central differences and one extrapolation.
-fn difference(simulation: &Simulation<'_, Driven, 2>, start: State<2>) -> DMatrix<f64> {
-    const DELTA: f64 = 2e-3;
-    let end = |column: usize, offset: f64| {
-        let mut start = start;
-        match column {
-            0 | 1 => start.p[column] += offset,
-            _ => start.q[column - 2] += offset,
-        }
-        let State { q, p } = simulation.run(start, SPAN).expect("a run").last().state();
-        [p[0], p[1], q[0], q[1]]
-    };
-    DMatrix::from_fn(4, 4, |row, column| {
-        let slope =
-            |delta: f64| (end(column, delta)[row] - end(column, -delta)[row]) / (2.0 * delta);
-        (4.0 * slope(0.5 * DELTA) - slope(DELTA)) / 3.0
-    })
-}
-
 #[test]
 fn the_product_is_the_derivative_of_the_run() {
     let model = Driven { c: 0.2 };
@@ -63,7 +45,7 @@ fn the_product_is_the_derivative_of_the_run() {
             .impulse(2.0, [0.3, 0.3]);
         let run = simulation.run_linearised(start, SPAN).expect("a run");
         assert_eq!(run.transitions().len(), run.motion().states().len() - 1);
-        let error = (run.product() - difference(&simulation, start)).amax();
+        let error = (run.product() - difference(&simulation, start, SPAN)).amax();
         // Truncation: δ⁴/480 times fifth derivatives, of order 10³ after twenty steps; round-off: 1e-15/δ.
         assert!(error <= 1e-10, "{element}: {error:.1e}");
     }

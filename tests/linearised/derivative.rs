@@ -1,6 +1,7 @@
 //! The transition matrix is the derivative of the step: every element, both declarations, on a nonlinear, damped and driven model.
 
 use nalgebra::DMatrix;
+use std::ops::Range;
 use tfe::prelude::*;
 
 /// A mass that depends on the position, a gyroscopic coupling, a potential and a force that depend on time, damping that is not linear.
@@ -40,29 +41,24 @@ fn elements(nodes: usize) -> Vec<Element> {
     ]
 }
 
-/// The derivative of one step by its start, in the order (p, q): central differences, extrapolated once,
+/// The derivative of the end of a run by its start, in the order (p, q): central differences, extrapolated once,
 ///
 /// ```text
 /// D(δ) = (f(y + δ) − f(y − δ)) / 2δ ,      f′ = (4 D(δ/2) − D(δ)) / 3 + O(δ⁴) .
 /// ```
-fn difference<M: Model<2>>(
-    model: &M,
-    element: Element,
+pub(crate) fn difference<M: Model<2>>(
+    simulation: &Simulation<'_, M, 2>,
     start: State<2>,
-    t: f64,
-    h: f64,
+    span: Range<f64>,
 ) -> DMatrix<f64> {
     const DELTA: f64 = 2e-3;
-    let simulation = Simulation::new(model).element(element).step(h);
     let end = |column: usize, offset: f64| {
         let mut start = start;
         match column {
             0 | 1 => start.p[column] += offset,
             _ => start.q[column - 2] += offset,
         }
-        let motion = simulation
-            .run(start, t..t + h)
-            .unwrap_or_else(|error| panic!("{element}: {error}"));
+        let motion = simulation.run(start, span.clone()).expect("a run");
         let State { q, p } = motion.last().state();
         [p[0], p[1], q[0], q[1]]
     };
@@ -88,7 +84,8 @@ fn check<M: Model<2>>(model: &M, start: State<2>, declared_by: &str) {
             for h in [0.3, -0.2] {
                 let a = stability::transition_matrix(model, element, &start, 0.7, h)
                     .unwrap_or_else(|error| panic!("{element} by {declared_by}: {error}"));
-                let expected = difference(model, element, start, 0.7, h);
+                let simulation = Simulation::new(model).element(element).step(h);
+                let expected = difference(&simulation, start, 0.7..0.7 + h);
                 let error = (a - expected).amax();
                 // Truncation: δ⁴/480 times fifth derivatives of order 10; round-off: 1e-16/δ, times a few. Together 1e-12.
                 assert!(
