@@ -350,10 +350,7 @@ impl fmt::Display for RunErrorKind {
                 )
             }
             Self::NoOutput { name, known } => {
-                let known = match known.is_empty() {
-                    true => "none".to_owned(),
-                    false => known.join(", "),
-                };
+                let known = listed(known);
                 write!(f, "there is no output `{name}`: the model declares {known}")
             }
             Self::Loss { name, why } => {
@@ -380,10 +377,7 @@ impl fmt::Display for RunErrorKind {
                 )
             }
             Self::NoParameter { name, known } => {
-                let known = match known.is_empty() {
-                    true => "none".to_owned(),
-                    false => known.join(", "),
-                };
+                let known = listed(known);
                 write!(
                     f,
                     "there is no parameter `{name}`: the model has {known}"
@@ -490,6 +484,14 @@ impl fmt::Display for RunErrorKind {
                 )
             }
         }
+    }
+}
+
+/// Names that are known, in a message.
+fn listed(known: &[String]) -> String {
+    match known.is_empty() {
+        true => "none".to_owned(),
+        false => known.join(", "),
     }
 }
 
