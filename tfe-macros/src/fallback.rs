@@ -42,7 +42,7 @@ pub(crate) fn error((first, last): (Span, Span), message: &str) -> TokenStream {
 
 /// A message for each attribute between arguments, such as a `cfg`; the arguments are read without it.
 pub(crate) fn attributes_of_arguments(map: &SourceMap) -> TokenStream {
-    let message = "arguments have no attributes but doc comments\nhelp: put a `cfg` on the whole struct, and declare it once for each configuration";
+    let message = "an argument cannot have attributes other than doc comments\nhelp: put a `cfg` on the whole struct, and declare it once for each configuration";
     map.attributes
         .iter()
         .map(|spans| error(*spans, message))

@@ -18,7 +18,7 @@ pub(crate) fn parse(item: TokenStream) -> syn::Result<ItemStruct> {
     syn::parse2(item).map_err(|error| {
         syn::Error::new(
             span.unwrap_or_else(|| error.span()),
-            "`#[dynamics]` belongs on a struct that holds the parameters",
+            "`#[dynamics]` can only be applied to a struct, whose fields are the parameters",
         )
     })
 }
@@ -37,7 +37,7 @@ pub(crate) fn check(item: &ItemStruct) -> syn::Result<()> {
     if let Fields::Unnamed(fields) = &item.fields {
         return Err(syn::Error::new_spanned(
             fields,
-            "a model's parameters need names\nhelp: write `struct Name { m: f64, g: f64 }`",
+            "the parameters of a model need names\nhelp: write `struct Name { m: f64, g: f64 }`",
         ));
     }
     let parameters = item.generics.params.iter().filter_map(unusable);
@@ -46,7 +46,7 @@ pub(crate) fn check(item: &ItemStruct) -> syn::Result<()> {
     let configured = configured.map(|attribute| {
         syn::Error::new_spanned(
             attribute,
-            "a parameter cannot depend on the configuration: its model is derived with it in any case\nhelp: put the `cfg` on the whole struct, and declare it once for each configuration",
+            "a parameter cannot have a `cfg` attribute: the model is derived with all parameters\nhelp: put the `cfg` on the whole struct, and declare it once for each configuration",
         )
     });
     let all = parameters.chain(configured).reduce(|mut all, one| {
@@ -64,10 +64,10 @@ fn unusable(parameter: &GenericParam) -> Option<syn::Error> {
             return Some(syn::Error::new_spanned(&parameter.ident, message));
         }
         GenericParam::Lifetime(_) => {
-            "a model can have const parameters only\nhelp: let it own its parameters: `f64`, `[f64; N]` or `Vec<f64>`"
+            "a model cannot have generic parameters other than const parameters\nhelp: let the struct own its parameters: `f64`, `[f64; N]` or `Vec<f64>`"
         }
         _ => {
-            "a model can have const parameters only\nhelp: use `const N: usize` for a length; all parameters are `f64`"
+            "a model cannot have generic parameters other than const parameters\nhelp: use `const N: usize` for a length, and `f64` for numbers"
         }
     };
     Some(syn::Error::new_spanned(parameter, message))
@@ -90,7 +90,7 @@ fn is_temporary(name: &str) -> bool {
 fn taken_by_generated_code(name: &Ident) -> Option<String> {
     let name = plain(name);
     let what = match name.as_str() {
-        "R" => "the scalar",
+        "R" => "a type",
         "t" => "a variable",
         other if LOCALS.contains(&other) || VARIABLES.contains(&other) => "a variable",
         other if is_temporary(other) || other.starts_with("__") => "a variable",
@@ -113,7 +113,7 @@ pub(crate) fn take_repeated(item: &mut ItemStruct) -> TokenStream {
         .map(|attribute| {
             syn::Error::new_spanned(
                 attribute.path(),
-                "a struct declares one model\nhelp: declare the other one on a struct of its own, or by `model(Name, …)`",
+                "a struct can declare only one model\nhelp: declare the other model on a struct of its own, or derive it with `model(Name, …)`",
             )
             .to_compile_error()
         })

@@ -23,7 +23,7 @@ pub(crate) fn of_many_types(item: &ItemStruct, map: &SourceMap) -> TokenStream {
     };
     let [model, parameter] = [&item.ident, &parameter.ident].map(input::plain);
     let message = format!(
-        "a solver is for one type, but `{model}` has the const parameter `{parameter}`\nhelp: write a number in place of `{parameter}`, or use `Simulation`"
+        "a solver needs a model without const parameters, but `{model}` has `{parameter}`\nhelp: write a number in place of `{parameter}`, or use `Simulation`"
     );
     let arguments = parse::split_arguments(&map.text).into_iter();
     let elements = arguments.filter_map(|range| {

@@ -183,7 +183,7 @@ pub struct ConstraintSecond<'a, R, const N: usize> {
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a model of fixed size",
     label = "not a model of fixed size",
-    note = "models are structs with `#[dynamics(...)]`; what those with `coordinates(q[n])` have is listed in `docs/calls.md`, all else needs a length known here, such as `q[10]`"
+    note = "models are structs with `#[dynamics(...)]`; `docs/calls.md` lists what models with `coordinates(q[n])` support, all else needs a length known at compile time, such as `q[10]`"
 )]
 pub trait Model<const N: usize> {
     /// The function by which it was declared.

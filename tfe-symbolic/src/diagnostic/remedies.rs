@@ -19,15 +19,15 @@ impl Kind {
             Self::EqualsSign {
                 left: Some(left),
                 right,
-            } => format!("write what is zero: `{left} - ({right})`"),
+            } => format!("write an expression that must be zero: `{left} - ({right})`"),
             Self::EqualsSign { left: None, .. } => {
-                "write one expression; parts of it can be named by `let name = …` before it".into()
+                "write one expression, and name parts of it with `let name = …` before it".into()
             }
             Self::FieldAccess { object, field } if object == "self" => {
-                format!("the fields of the struct are in scope: write `{field}`")
+                format!("write `{field}`: the fields of the struct are in scope")
             }
             Self::FieldAccess { object, field } => format!(
-                "formulas use the fields of the struct under the attribute: declare `{object}_{field}: f64`"
+                "formulas can use only the fields of this struct: declare `{object}_{field}: f64`"
             ),
             Self::MethodCall { object, method } if is_power(method) => {
                 format!("write `^` for a power, as in `{object}^2`")
@@ -40,7 +40,7 @@ impl Kind {
                 Some("PI") => "write `pi`".into(),
                 Some(name) if vocabulary::is_function(name) => format!("write `{name}(…)`"),
                 _ => {
-                    "formulas use fields of the struct, coordinates and `let`s, by their names".into()
+                    "write the name of a field of the struct, a coordinate or a `let`".into()
                 }
             },
             Self::Bars => {
@@ -128,69 +128,66 @@ impl Kind {
             }
             Self::FamilyNotAlone { name } => {
                 format!(
-                    "make the others elements of `{name}`, give all arrays literal lengths, or make the \
-                     length a field of type `usize`"
+                    "make the other coordinates elements of `{name}`, give all arrays literal lengths, or make the length a field of type `usize`"
                 )
             }
             Self::RunTimeLength { .. } => {
-                "give the coordinates a length known here, such as `q[10]`".into()
+                "give the coordinates a literal length, such as `q[10]`".into()
             }
             Self::ConstraintNotAffine { .. } => {
-                "write a condition on positions, or one in which velocities stand linearly, such \
-                 as `dot(x)*sin(phi) - dot(y)*cos(phi)`"
+                "write a constraint on positions, or one in which velocities appear only linearly, such as `dot(x)*sin(phi) - dot(y)*cos(phi)`"
                     .into()
             }
             Self::ConstraintWithoutCoordinate { .. } => {
-                "write what must vanish, such as `x^2 + y^2 - l^2`".into()
+                "write an expression that must be zero, such as `x^2 + y^2 - l^2`".into()
             }
             Self::RepeatedConstraint { name, .. } => format!("remove `{name}`"),
             Self::MomentumInConstraint => "write the velocity instead, such as `dot(x)`".into(),
             Self::VelocityConstraintOfFamily { .. } => {
-                "write a condition on positions, or give the coordinates a length known here, such \
-                 as `q[10]`"
+                "write a constraint on positions, or give the coordinates a literal length, such as `q[10]`"
                     .into()
             }
             Self::ConstraintRange { .. } => {
-                "write the constraints out, give the array and the range literal lengths, or make the \
-                 length of the array a field of type `usize`"
+                "declare the constraints one by one, give the array and the range literal lengths, or make the length of the array a field of type `usize`"
                     .into()
             }
             Self::TooManyConstraints { .. } => "split the family into several shorter ones".into(),
             Self::SumInConstraint { limit, .. } => {
-                format!("make the length a number of at most {limit}, or write the sum out")
+                format!("give the sum a literal length of at most {limit}, or write out its terms")
             }
             Self::ParameterOfConstraint { .. } => {
-                "remove it from `sensitivity`: derivatives of constraints by parameters are not \
-                 available"
+                "remove it from `sensitivity`: derivatives of constraints with respect to parameters are not supported"
                     .into()
             }
             Self::SolverOfConstraints { nodes, .. }
             | Self::SolverOfTransformation { nodes, .. } => format!("use `Mixed::<{nodes}>`"),
             Self::ListInRange { .. } => {
-                "bound the range by numbers and fields of type `usize`".into()
+                "use numbers and fields of type `usize` as bounds".into()
             }
-            Self::OutputFamily => "declare one `output` an element".into(),
+            Self::OutputFamily => "declare one `output` for each element".into(),
             Self::NoEnergy => "add `lagrangian = …` or `hamiltonian = …`".into(),
             Self::TwoEnergies => "keep one of them".into(),
-            Self::NoMomenta => "add `momenta(…)`, one for each coordinate, in their order".into(),
+            Self::NoMomenta => {
+                "add `momenta(…)`, one for each coordinate, in the same order".into()
+            }
             Self::TransformationOfLagrangian => {
-                "declare the model by `momenta(…)` and `hamiltonian = …`".into()
+                "declare the model with `momenta(…)` and `hamiltonian = …`".into()
             }
             Self::TransformationOfFamily { .. } => {
-                "give the coordinates a length known here, such as `q[10]`".into()
+                "give the coordinates a literal length, such as `q[10]`".into()
             }
             Self::TransformationWith {
                 argument: "constraint",
             } => "choose coordinates that satisfy the constraints, or remove one of the two".into(),
             Self::TransformationWith { .. } => "remove one of the two".into(),
             Self::TransformationNotPositive => {
-                "write dt/dτ, such as the distance from a singularity".into()
+                "write a positive expression for dt/dτ, such as the distance from a singularity".into()
             }
             Self::PowerOfLoop { limit } => format!(
-                "make the length a number of at most {limit}, or remove `time_transformation`"
+                "give the sums literal lengths of at most {limit}, or remove `time_transformation`"
             ),
             Self::MomentaWithLagrangian => {
-                "remove `momenta`; they follow from the Lagrangian as ∂L/∂v".into()
+                "remove `momenta`: they are derived from the Lagrangian as ∂L/∂v".into()
             }
             Self::MomentaMismatch { .. } => {
                 "declare one momentum for each coordinate, in the same order and of the same \
@@ -205,23 +202,25 @@ impl Kind {
                 format!("add its kinetic energy, such as `m/2*dot({name})^2`")
             }
             Self::LinearVelocity { name } => {
-                format!("the Lagrangian must hold `dot({name})` other than linearly")
+                format!("add a term that is not linear in `dot({name})`, such as `m/2*dot({name})^2`")
             }
-            Self::ConstantEnergy { .. } => "write kinetic and potential energy".into(),
+            Self::ConstantEnergy { .. } => "write the kinetic and potential energies".into(),
             Self::DissipationWithoutVelocity => {
-                "a Rayleigh function holds velocities, such as `c/2*dot(x)^2`".into()
+                "write a Rayleigh function of velocities, such as `c/2*dot(x)^2`".into()
             }
-            Self::NoInput => "name numbers that are given at run time, as in `input(u)`".into(),
+            Self::NoInput => "name quantities that are given at run time, as in `input(u)`".into(),
             Self::TooManyInputs { .. } => {
-                "put those that depend on each other into formulas of one".into()
+                "replace inputs that depend on each other by formulas of one input".into()
             }
             Self::InputWith { argument } => {
-                format!("remove one of them: what `{argument}` makes is given no inputs")
+                format!("remove one of them: the type that `{argument}` declares does not support inputs")
             }
-            Self::UnusedInput { name } => format!("use it, as in `force(x) = {name}`, or remove it"),
-            Self::RateOfInput { .. } => "declare an input of its own for the rate".into(),
+            Self::UnusedInput { name } => {
+                format!("use it, as in `force(x) = {name}`, or remove it")
+            }
+            Self::RateOfInput { .. } => "declare another input for this derivative".into(),
             Self::InputOfConstraint { .. } => {
-                "write the motion as a formula of `t`, or let a stiff spring follow the input".into()
+                "write the prescribed motion as a formula of `t`, or replace the constraint by a stiff spring".into()
             }
             Self::NoSensitivity => "name fields of the struct, as in `sensitivity(omega)`".into(),
             Self::UnknownParameter {
@@ -229,11 +228,10 @@ impl Kind {
                 name,
             } => format!("declare `{name}` as a field of the struct"),
             Self::NotAParameter { target, role: None } if target == "t" => {
-                "derivatives by the time come with those by any parameter".into()
+                "derivatives with respect to time are included with any parameter".into()
             }
             Self::NotAParameter { .. } => {
-                "derivatives are taken by fields of type `f64` and by elements of array fields, \
-                 such as `k[2]`"
+                "name fields of type `f64` or elements of array fields, such as `k[2]`"
                     .into()
             }
             Self::ArrayOfParameters { name } => {
@@ -243,38 +241,39 @@ impl Kind {
                 format!("name each element, as in `{array}[0], {array}[1]`")
             }
             Self::RepeatedParameter { .. } => "name it once".into(),
-            Self::NoPass { name } => format!("say what to do, as in `model({name}, truncated(2))`"),
+            Self::NoPass { name } => format!("add a pass, as in `model({name}, truncated(2))`"),
             Self::UnknownPass { nearest: None, .. } => {
                 format!("the passes are {}", backticked(vocabulary::PASSES))
             }
-            Self::PassEntry { pass } => format!("write it like `{}`", usage(pass)),
+            Self::PassEntry { pass } => format!("write it as in `{}`", usage(pass)),
             Self::TruncationDegree { .. } => "write `truncated(2)` for a linear model".into(),
             Self::UnknownCoordinate { nearest: None, .. } => {
-                "name a coordinate as declared, such as `x` or `q[2]`; momenta and velocities \
-                 belong to truncations"
+                "name a coordinate as declared, such as `x` or `q[2]`; only `truncated` takes momenta and velocities"
                     .into()
             }
             Self::RepeatedEntry { .. } => "give it once".into(),
-            Self::PassValue { .. } => "write numbers and fields of the struct".into(),
+            Self::PassValue { .. } => {
+                "write an expression of numbers and fields of the struct".into()
+            }
             Self::PassOfLength {
-                pass: "frozen" | "rigid" | "elastic",
-            } => "give arrays of coordinates literal lengths of at most some thousand".into(),
+                pass: "frozen" | "rigid" | "elastic" | "routh",
+            } => "give arrays of coordinates literal lengths of at most a few thousand".into(),
             Self::PassOfLength { .. } => {
-                "give arrays of coordinates literal lengths of at most some thousand, or say the \
-                 same of all elements of the only array"
+                "give arrays of coordinates literal lengths of at most a few thousand, or make the point the same for all elements of a single array"
                     .into()
             }
             Self::TruncationOfConstraints => {
-                "choose coordinates that satisfy the constraints, or make them springs by \
-                 `elastic(name = k)` first"
+                "choose coordinates that satisfy the constraints, or replace the constraints by springs first, with `elastic(name = k)`"
                     .into()
             }
-            Self::NoTaylorPolynomial => "give another point, such as `truncated(2, r = l)`".into(),
+            Self::NoTaylorPolynomial => {
+                "choose another point, such as `truncated(2, r = l)`".into()
+            }
             Self::LongTaylorPolynomial { .. } => {
                 "truncate at a lower degree, or freeze coordinates first".into()
             }
             Self::NotCyclic { .. } => {
-                "ignore coordinates only that appear by their velocities; `structure()` lists the cyclic ones".into()
+                "name only cyclic coordinates, which `structure()` lists".into()
             }
             Self::CyclicConstrained { .. } => {
                 "choose coordinates that satisfy the constraint".into()
@@ -282,9 +281,9 @@ impl Kind {
             Self::CyclicForced { name } => {
                 format!("keep `{name}`, or declare the model without the force")
             }
-            Self::RouthName { name, .. } => format!("give the field or output `{name}` another name"),
-            Self::CyclicNotQuadratic { .. } => "declare the model by a Hamiltonian".into(),
-            Self::FrozenHamiltonian => "declare the model by a Lagrangian".into(),
+            Self::RouthName { name, .. } => format!("rename the field or output `{name}`"),
+            Self::CyclicNotQuadratic { .. } => "declare the model with a Hamiltonian".into(),
+            Self::FrozenHamiltonian => "declare the model with a Lagrangian".into(),
             Self::NotASpring { .. } => {
                 "name a field of type `f64` whose energy is a square, such as `k/2*(r - l)^2`"
                     .into()
@@ -293,7 +292,7 @@ impl Kind {
             Self::ElasticVelocity { .. } => {
                 "name constraints on positions, or declare a `dissipation` instead".into()
             }
-            Self::NothingLeft { .. } => "leave one coordinate at least".into(),
+            Self::NothingLeft { .. } => "keep at least one coordinate".into(),
             Self::ConstraintLeft { .. } => {
                 "freeze fewer coordinates, or declare the constraint in another model".into()
             }
@@ -309,18 +308,19 @@ impl Kind {
             Self::FunctionAsValue { name } => format!("write `{name}(…)`"),
             Self::UsedBeforeLet { .. } => "move the `let` up".into(),
             Self::UnsupportedField { field_type, .. } if is_array_of_numbers(field_type) => {
-                "write its length as a number, or as a const parameter of the struct: the value of a \
-                 constant is not known here"
+                "write its length as a number or a const parameter of the struct: the macro does not know the values of constants"
                     .into()
             }
             Self::UnsupportedField { .. } => {
-                "formulas use fields of type `f64`, `[f64; N]`, `Vec<f64>` and `usize`".into()
+                "formulas can use fields of type `f64`, `[f64; N]`, `Vec<f64>` and `usize`".into()
             }
-            Self::Acceleration => "forces and energies depend on velocities at most".into(),
+            Self::Acceleration => {
+                "formulas can depend on velocities, but not on their time derivatives".into()
+            }
             Self::VelocityInHamiltonian { .. } | Self::VelocityOfLoop => {
                 "write the momenta instead".into()
             }
-            Self::RateOfMomentum => "write the force that changes it".into(),
+            Self::RateOfMomentum => "write the force on its coordinate instead".into(),
             Self::VariableExponent { base, exponent } => {
                 format!("write `exp(({exponent})*ln({base}))` if the base is always positive")
             }
@@ -329,26 +329,24 @@ impl Kind {
             }
             Self::VectorExpected => "write a vector as `[a, b, c]`".into(),
             Self::Matrix => {
-                "there are no matrices: name each row by a `let`, and write a product as \
-                 `[inner(row0, r), inner(row1, r)]`"
+                "there are no matrices: name each row with a `let`, and write a product as `[inner(row0, r), inner(row1, r)]`"
                     .into()
             }
             Self::ProductOfVectors => "use `inner(a, b)` or `cross(a, b)`".into(),
             Self::RootOfNegative => {
-                "put the sign in front for an odd root, as in `-8^(1/3)`".into()
+                "for an odd root, put the sign in front, as in `-8^(1/3)`".into()
             }
             Self::PowerOfVector => "use `inner(r, r)` for the square of the length".into(),
             Self::DivisionByVector => "divide by its `norm`".into(),
             Self::WholeArray { name } => format!("write an element such as `{name}[i]`"),
             Self::IndexNotConstant { .. } => {
-                "an index that varies needs a coordinate array or an array field".into()
+                "only coordinate arrays and array fields can have a variable index".into()
             }
             Self::SitesBelowZero { .. } => {
-                "begin at zero, and shift the index inside of the formula".into()
+                "begin at zero, and shift the index in the formula".into()
             }
             Self::NonlinearSum { limit } => format!(
-                "make the length a number of at most {limit}, or rewrite the energy as a sum of \
-                 local terms; the square of a sum is a double sum"
+                "give the sum a literal length of at most {limit}, or rewrite the energy as a sum of local terms; the square of a sum is a double sum"
             ),
             Self::NodesOutOfRange { .. } => "choose 2 to 12 nodes".into(),
             Self::PointsOutOfRange { .. } => {
@@ -360,7 +358,7 @@ impl Kind {
             }
             Self::RepeatedArgument { argument } => match *argument {
                 "coordinates" | "momenta" | "sensitivity" => {
-                    format!("name all in one `{argument}(…)`")
+                    format!("name all of them in one `{argument}(…)`")
                 }
                 "lagrangian" | "hamiltonian" | "dissipation" => {
                     format!("add up the terms in one `{argument} = …`")
@@ -371,7 +369,7 @@ impl Kind {
                 function, found, ..
             } => return wrong_arity(function, *found).map(str::to_owned),
             Self::Expected { found, .. } if found == "`\"`" => {
-                "formulas stand without quotes, as in `lagrangian = m/2*dot(x)^2`".into()
+                "write formulas without quotes, as in `lagrangian = m/2*dot(x)^2`".into()
             }
             Self::Expected { .. }
             | Self::NumberTooLarge { .. }
@@ -417,7 +415,9 @@ fn unknown_function(name: &str) -> String {
 /// What was meant by a function with this many arguments.
 fn wrong_arity(function: &str, found: usize) -> Option<&'static str> {
     match (function, found) {
-        ("dot", 2) => Some("`dot(e)` is the rate of e; write `inner(a, b)` for a scalar product"),
+        ("dot", 2) => {
+            Some("`dot(e)` is the time derivative of e; write `inner(a, b)` for a scalar product")
+        }
         ("atan", 2) => Some("write `atan2(y, x)` for the angle of a point"),
         ("norm", 2..) => Some("write a vector, as in `norm([x, y])`"),
         ("hypot", 3..) => Some("write `norm([x, y, z])`"),

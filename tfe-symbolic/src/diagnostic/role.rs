@@ -42,7 +42,7 @@ impl fmt::Display for Role {
             Self::ConstParameter => "a const parameter of the struct",
             Self::Input => "an input",
             Self::Let => "a `let`",
-            Self::Index => "the index of a sum around it",
+            Self::Index => "the index of an enclosing sum",
             Self::Output => "an output",
             Self::Constraint => "a constraint",
             Self::Solver => "a solver",

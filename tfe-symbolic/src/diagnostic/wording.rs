@@ -15,16 +15,16 @@ impl Kind {
             Self::NumberWithType { .. } => "numbers in formulas have no type".into(),
             Self::DoubleStar => "`**` is not an operator".into(),
             Self::InclusiveRange => "`..=` is not supported in sums".into(),
-            Self::Condition { word } => format!("`{word}` is not part of the language of formulas"),
-            Self::EqualsSign { .. } => "a formula cannot hold `=`".into(),
+            Self::Condition { word } => format!("`{word}` cannot be used in a formula"),
+            Self::EqualsSign { .. } => "a formula cannot contain `=`".into(),
             Self::FieldAccess { object, field } => {
                 format!("a formula cannot read the field `{field}` of `{object}`")
             }
             Self::MethodCall { method, .. } => {
                 format!("a formula cannot call the method `{method}`")
             }
-            Self::Path { path } => format!("a formula cannot hold the path `{path}`"),
-            Self::Bars => "`|` is not part of the language of formulas".into(),
+            Self::Path { path } => format!("a formula cannot contain the path `{path}`"),
+            Self::Bars => "`|` cannot be used in a formula".into(),
             Self::NestedTooDeep { limit } => {
                 format!("expression is nested more than {limit} levels deep")
             }
@@ -37,12 +37,14 @@ impl Kind {
             Self::RepeatedArgument { argument } => format!("`{argument}` is given more than once"),
             Self::NameClash { name, taken } => format!("the name `{name}` is taken by {taken}"),
             Self::ReservedName { name, .. } => {
-                format!("the name `{name}` has a meaning of its own in formulas")
+                format!("the name `{name}` is reserved in formulas")
             }
             Self::ReservedPrefix { name, .. } => {
-                format!("the name `{name}` begins like those of the generated code")
+                format!("the name `{name}` begins with `__tfe`, which is reserved for generated code")
             }
-            Self::Keyword { name } => format!("`{name}` is a keyword of Rust and cannot be a name"),
+            Self::Keyword { name } => {
+                format!("`{name}` is a keyword of Rust and cannot be used as a name")
+            }
             Self::ZeroLength { name, .. } => format!("array `{name}` has no elements"),
             Self::UnknownLength { name, .. } => format!("unknown length `{name}`"),
             Self::LengthNotSimple => {
@@ -54,7 +56,7 @@ impl Kind {
                 format!("the model has more than {limit} coordinates")
             }
             Self::FamilyNotAlone { name } => {
-                format!("array `{name}` has a generic length and is not the only coordinate")
+                format!("array `{name}` has a generic length, so it must be the only coordinate")
             }
             Self::RunTimeLength { argument } => {
                 format!("`{argument}` in a model of run-time length is not supported yet")
@@ -63,44 +65,50 @@ impl Kind {
                 format!("constraint `{name}` is not affine in the velocities")
             }
             Self::ConstraintWithoutCoordinate { name } => {
-                format!("constraint `{name}` holds no coordinate")
+                format!("constraint `{name}` does not depend on any coordinate")
             }
             Self::RepeatedConstraint { name, other } => {
-                format!("constraint `{name}` repeats `{other}`")
+                format!("constraint `{name}` is equivalent to `{other}`")
             }
             Self::MomentumInConstraint => "momenta cannot be used in a constraint".into(),
             Self::VelocityConstraintOfFamily { name } => format!(
-                "constraint `{name}` holds velocities, which models of run-time length do not support yet"
+                "constraint `{name}` contains velocities, which models of run-time length do not support yet"
             ),
             Self::ConstraintRange { range } => {
-                format!("a family of constraints needs a range known here, found `{range}`")
+                format!("a family of constraints needs a literal range, found `{range}`")
             }
             Self::TooManyConstraints { limit } => {
                 format!("a family of constraints has more than {limit} members")
             }
             Self::SumInConstraint { name, .. } => {
-                format!("constraint `{name}` holds a sum that cannot be written out")
+                format!("constraint `{name}` contains a sum that cannot be written out term by term")
             }
             Self::ListInRange { list } => {
                 format!("the bound of a range cannot be an entry of the list `{list}`")
             }
-            Self::OutputFamily => "outputs over a range are for models of run-time length".into(),
+            Self::OutputFamily => {
+                "outputs over a range are supported only in models of run-time length".into()
+            }
             Self::NoEnergy => "the model has neither a Lagrangian nor a Hamiltonian".into(),
             Self::TwoEnergies => "the model has both a Lagrangian and a Hamiltonian".into(),
             Self::NoMomenta => "a Hamiltonian needs momenta".into(),
-            Self::TransformationOfLagrangian => "a time transformation needs a hamiltonian".into(),
+            Self::TransformationOfLagrangian => "a time transformation needs a Hamiltonian".into(),
             Self::TransformationOfFamily { length } => format!(
-                "a time transformation needs a number of coordinates known here, but `{length}` is generic"
+                "a time transformation needs coordinates of literal length, found length `{length}`"
             ),
             Self::TransformationWith { argument } => {
-                format!("a time transformation does not go with `{argument}`")
+                format!("a time transformation cannot be combined with `{argument}`")
             }
-            Self::TransformationNotPositive => "the rate of the time is not positive".into(),
+            Self::TransformationNotPositive => {
+                "the time transformation dt/dτ is not positive".into()
+            }
             Self::PowerOfLoop { .. } => {
-                "the power of the forces cannot be written out where a Hamiltonian is summed in a loop"
+                "a time transformation with forces needs a Hamiltonian whose sums can be written out term by term"
                     .into()
             }
-            Self::MomentaWithLagrangian => "a model with a Lagrangian declares no momenta".into(),
+            Self::MomentaWithLagrangian => {
+                "a model with a Lagrangian cannot declare momenta".into()
+            }
             Self::MomentaMismatch {
                 coordinates,
                 momenta,
@@ -113,7 +121,7 @@ impl Kind {
             }
             Self::UnusedField { name } => format!("field `{name}` is not used in any formula"),
             Self::NoVelocity { name } => {
-                format!("coordinate `{name}` has no velocity in the Lagrangian")
+                format!("the velocity of coordinate `{name}` does not appear in the Lagrangian")
             }
             Self::LinearVelocity { name } => {
                 format!("the momentum of coordinate `{name}` does not depend on any velocity")
@@ -121,24 +129,28 @@ impl Kind {
             Self::ConstantEnergy { energy } => {
                 format!("the {energy} does not depend on the state of the system")
             }
-            Self::DissipationWithoutVelocity => "the dissipation depends on no velocity".into(),
-            Self::NoInput => "`input` names nothing".into(),
+            Self::DissipationWithoutVelocity => {
+                "the dissipation does not depend on any velocity".into()
+            }
+            Self::NoInput => "`input` names no input".into(),
             Self::TooManyInputs { limit } => format!("a model can have at most {limit} inputs"),
             Self::InputWith { argument } => {
-                format!("an input cannot stand beside `{argument}`")
+                format!("an input cannot be combined with `{argument}`")
             }
             Self::UnusedInput { name } => format!("input `{name}` is not used in any formula"),
-            Self::RateOfInput { name } => format!("the rate of input `{name}` is not known"),
+            Self::RateOfInput { name } => {
+                format!("the time derivative of input `{name}` is not known")
+            }
             Self::InputOfConstraint { name, constraint } => {
-                format!("constraint `{constraint}` depends on input `{name}`, whose rate is not known")
+                format!("constraint `{constraint}` depends on input `{name}`, whose time derivative is not known")
             }
             Self::NoSensitivity => "`sensitivity` names no parameter".into(),
             Self::NotAParameter {
                 target,
                 role: Some(role),
-            } => format!("cannot differentiate by `{target}`, which is {role}"),
+            } => format!("cannot differentiate with respect to `{target}`, which is {role}"),
             Self::NotAParameter { target, role: None } => {
-                format!("cannot differentiate by `{target}`")
+                format!("cannot differentiate with respect to `{target}`")
             }
             Self::UnknownParameter { name, .. } => format!("unknown parameter `{name}`"),
             Self::ArrayOfParameters { name } => {
@@ -151,13 +163,13 @@ impl Kind {
                 format!("`sensitivity` names `{name}` more than once")
             }
             Self::ParameterOfConstraint { name, constraint } => {
-                format!("cannot differentiate by `{name}`, which constraint `{constraint}` holds")
+                format!("cannot differentiate with respect to `{name}`, because constraint `{constraint}` depends on it")
             }
-            Self::NoPass { name } => format!("model `{name}` is made by nothing"),
+            Self::NoPass { name } => format!("model `{name}` has no pass"),
             Self::UnknownPass { name, .. } => format!("unknown pass `{name}`"),
-            Self::PassEntry { pass } => format!("this does not fit into `{pass}(…)`"),
+            Self::PassEntry { pass } => format!("invalid arguments of `{pass}(…)`"),
             Self::TruncationDegree { limit } => {
-                format!("the degree of a truncation is an integer from 2 to {limit}")
+                format!("the degree of a truncation must be an integer from 2 to {limit}")
             }
             Self::UnknownCoordinate { name, .. } => {
                 format!("`{name}` is not a coordinate of the model")
@@ -165,13 +177,13 @@ impl Kind {
             Self::NoSuchElement { name } => format!("there is no coordinate `{name}`"),
             Self::RepeatedEntry { name } => format!("`{name}` is given more than once"),
             Self::PassValue { pass: "frozen" } => {
-                "a frozen coordinate can depend on parameters and the time only".into()
+                "a frozen coordinate can depend only on parameters and time".into()
             }
             Self::PassValue { .. } => {
-                "the point of a truncation can depend on parameters only".into()
+                "the point of a truncation can depend only on parameters".into()
             }
             Self::PassOfLength { pass } => {
-                format!("`{pass}` needs sums written out, which is not possible here")
+                format!("`{pass}` needs arrays and sums of literal length")
             }
             Self::TruncationOfConstraints => "a model with constraints cannot be truncated".into(),
             Self::NoTaylorPolynomial => {
@@ -188,13 +200,13 @@ impl Kind {
                 format!("`{name}` cannot be ignored: a constraint acts on it")
             }
             Self::CyclicForced { name } => {
-                format!("`{name}` cannot be ignored: a force acts on it, so that its momentum is not constant")
+                format!("`{name}` cannot be ignored: a force acts on it, so its momentum is not constant")
             }
             Self::CyclicNotQuadratic { name } => {
                 format!("`{name}` cannot be ignored: the Lagrangian is not quadratic in its velocity")
             }
             Self::RouthName { name, coordinate } => {
-                format!("`{coordinate}` cannot be ignored: the name `{name}` is taken, and needed for its momentum or velocity")
+                format!("`{coordinate}` cannot be ignored: the name `{name}`, needed for its momentum or velocity, is already taken")
             }
             Self::NotASpring { field, found } => {
                 format!("`{field}` is not the stiffness of a spring: {found}")
@@ -203,11 +215,11 @@ impl Kind {
                 format!("`{name}` is not a constraint of the model")
             }
             Self::ElasticVelocity { name } => {
-                format!("constraint `{name}` holds velocities and cannot become a spring")
+                format!("constraint `{name}` contains velocities and cannot be replaced by a spring")
             }
             Self::NothingLeft { pass } => format!("`{pass}` leaves no coordinate"),
             Self::ConstraintLeft { name } => {
-                format!("constraint `{name}` holds no coordinate any more")
+                format!("constraint `{name}` no longer depends on any coordinate")
             }
             Self::MasslessCoordinate { model, name } => {
                 format!("coordinate `{name}` of model `{model}` has no kinetic energy")
@@ -240,14 +252,16 @@ impl Kind {
                 format!("`{name}` contains a velocity and cannot be used in a Hamiltonian")
             }
             Self::VelocityOfLoop => {
-                "velocities are not available where a Hamiltonian is summed in a loop".into()
+                "velocities are not available in a model whose Hamiltonian contains a sum in a loop".into()
             }
-            Self::RateOfMomentum => "the rate of a momentum cannot be used in a model".into(),
+            Self::RateOfMomentum => {
+                "the time derivative of a momentum cannot be used in a model".into()
+            }
             Self::VariableExponent { exponent, .. } => {
-                format!("exponent `{exponent}` varies while the base may become negative")
+                format!("exponent `{exponent}` is not constant, and the base may be negative")
             }
             Self::DivisionByZero => "division by zero".into(),
-            Self::RootOfNegative => "a power of a negative number needs a whole exponent".into(),
+            Self::RootOfNegative => "a power of a negative number needs an integer exponent".into(),
             Self::OutsideDomain { function } => {
                 format!("`{function}` is defined {} only", domain_words(*function))
             }
@@ -265,7 +279,7 @@ impl Kind {
             Self::EmptyVector => "a vector needs at least one component".into(),
             Self::Matrix => "the components of a vector are numbers, not vectors".into(),
             Self::WholeArray { name } => {
-                format!("array `{name}` has no length known here and needs an index")
+                format!("array `{name}` has no literal length and needs an index")
             }
             Self::IndexNotInteger { index } => format!("index `{index}` is not an integer"),
             Self::IndexNotAffine { index } => {
@@ -274,7 +288,7 @@ impl Kind {
                 )
             }
             Self::IndexNotConstant { index } => {
-                format!("index `{index}` into a vector is not a constant")
+                format!("index `{index}` of a vector is not constant")
             }
             Self::IndexOutOfRange {
                 array,
@@ -291,13 +305,15 @@ impl Kind {
             }
             Self::EmptyRange { range } => format!("range `{range}` is empty"),
             Self::SitesBelowZero { range } => {
-                format!("sites are counted from zero, and range `{range}` begins below")
+                format!("range `{range}` begins below zero")
             }
             Self::NonlinearSum { .. } => {
-                "a sum in a loop stands inside a nonlinear expression of the energy".into()
+                "a sum in a loop appears inside a nonlinear expression of the energy".into()
             }
             Self::UnknownElement { name, .. } => format!("unknown element `{name}`"),
-            Self::NodesOutOfRange { nodes } => format!("an element cannot have {nodes} nodes"),
+            Self::NodesOutOfRange { nodes } => {
+                format!("an element cannot have {}", counted(*nodes as usize, "node"))
+            }
             Self::PointsOutOfRange { points } => {
                 format!("a rule cannot have {}", counted(*points as usize, "point"))
             }
@@ -306,16 +322,16 @@ impl Kind {
                 format!("rule `{rule}` is not defined for `{family}`")
             }
             Self::SolverOfFamily { length } => {
-                format!("a solver needs sizes known here, but `{length}` is generic")
+                format!("a solver needs coordinates of literal length, found length `{length}`")
             }
             Self::SolverOfTransformation { element, .. } => {
-                format!("element `{element}` does not admit a time transformation")
+                format!("element `{element}` does not support a time transformation")
             }
             Self::SolverOfConstraints {
                 element, velocity, ..
             } => {
                 let kind = if *velocity { "velocity " } else { "" };
-                format!("element `{element}` does not admit {kind}constraints")
+                format!("element `{element}` does not support {kind}constraints")
             }
         }
     }
@@ -336,7 +352,7 @@ fn domain_words(function: Function) -> &'static str {
     match function.domain() {
         Domain::Everywhere => "everywhere",
         Domain::NotOddQuarterTurns => "away from odd multiples of π/2",
-        Domain::NonNegative => "for numbers that are not negative",
+        Domain::NonNegative => "for non-negative numbers",
         Domain::Positive => "for positive numbers",
         Domain::UnitInterval => "between −1 and 1",
         Domain::OpenUnitInterval => "strictly between −1 and 1",

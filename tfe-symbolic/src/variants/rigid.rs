@@ -41,7 +41,7 @@ impl Reduction {
             found,
         };
         if let Some(place) = elsewhere(model, stiffness) {
-            return Err(wrong(format!("it also stands in {place}")));
+            return Err(wrong(format!("it also appears in {place}")));
         }
         let (form, graph) = (model.form, &mut model.graph);
         let slope = derivative(graph, model.energy, stiffness);
@@ -64,11 +64,13 @@ impl Reduction {
                 };
                 let flat = super::notation::text(&self.model, flat);
                 let flat = flat.unwrap_or_else(|| "the elongation".to_owned());
-                Err(wrong(format!("{flat} has no slope where it is zero")))
+                Err(wrong(format!(
+                    "the gradient of {flat} vanishes where it is zero"
+                )))
             }
             _ => {
                 let slope = super::notation::text(&self.model, slope);
-                let slope = slope.unwrap_or_else(|| "no such square".to_owned());
+                let slope = slope.unwrap_or_else(|| "not such a square".to_owned());
                 let letter = form.letter();
                 Err(wrong(format!("∂{letter}/∂{stiffness} is {slope}")))
             }
