@@ -148,7 +148,7 @@ fn lengths_of_constraints_are_checked() {
     assert_eq!(check(4, 3), Ok(()));
     let message = "`constraint(rod[i in 0..n-1])` is empty: its range is 0..0";
     assert_eq!(check(1, 0), Err(message.to_owned()));
-    let message = "`l` has 4 elements, but `l[i]` in `constraint(rod[i in 0..n-1])` asks for 3";
+    let message = "`l` has 4 elements, but `l[i]` in `constraint(rod[i in 0..n-1])` needs 3";
     assert_eq!(check(4, 4), Err(message.to_owned()));
 }
 

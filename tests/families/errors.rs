@@ -75,7 +75,7 @@ fn lengths_are_checked_before_anything_else() {
     check(
         &coupled(3, 3, 4, 2),
         error,
-        "`m` has 4 elements, but `m[i]` in the sum over `i in 0..n` asks for 3",
+        "`m` has 4 elements, but `m[i]` in the sum over `i in 0..n` needs 3",
     );
     let (field, ranges) = ("k", "i in 0..n-1");
     let error = family::ModelError::FieldLength {
@@ -88,7 +88,7 @@ fn lengths_are_checked_before_anything_else() {
     check(
         &coupled(3, 3, 3, 1),
         error,
-        "`k` has 1 elements, but `k[i]` in the sum over `i in 0..n-1` asks for 2",
+        "`k` has 1 elements, but `k[i]` in the sum over `i in 0..n-1` needs 2",
     );
     let (array, index, ranges) = ("r", "j", "j in 0..n");
     let error = family::ModelError::Index {
@@ -118,7 +118,7 @@ fn lengths_of_no_array_are_errors() {
     }
     assert_eq!(
         message,
-        "`n` is 18446744073709551615, but no array has so many elements"
+        "`n` is 18446744073709551615, but an array cannot have so many elements"
     );
 }
 
@@ -336,7 +336,7 @@ fn dependent_rows_are_refused() {
     let error = error.expect_err("one row follows from another");
     let message = error.to_string();
     assert!(
-        message.contains("constraints depend on one another"),
+        message.contains("the constraints are dependent"),
         "{message}"
     );
 }

@@ -162,7 +162,7 @@ fn entries_of_lists_are_checked() {
         length: 4,
     };
     assert_eq!(outside, expected);
-    let message = "`right[3]` is 4, which takes the index of `q[right[b]]` in the sum over `b in 0..bonds` outside of `q`, which has 4 elements";
+    let message = "`right[3]` is 4, so the index of `q[right[b]]` in the sum over `b in 0..bonds` is out of range: `q` has 4 elements";
     assert_eq!(outside.to_string(), message);
     let huge = error(|model| model.left[0] = usize::MAX);
     let expected = family::ModelError::ListEntry {
@@ -177,7 +177,7 @@ fn entries_of_lists_are_checked() {
     assert_eq!(huge, expected);
     let short = error(|model| model.left.truncate(5));
     let message =
-        "`left` has 5 elements, but `left[b]` in `output(stretch[b in 0..bonds])` asks for 6";
+        "`left` has 5 elements, but `left[b]` in `output(stretch[b in 0..bonds])` needs 6";
     assert_eq!(short.to_string(), message);
     let none = error(|model| {
         model.bonds = 0;
@@ -242,9 +242,9 @@ fn entries_stand_wherever_indices_do() {
         change(&mut model);
         model.check().expect_err("a mistake").to_string()
     };
-    let message = "`kind[2]` is 2, which takes the index of `m[kind[i]]` in the sum over `i in 0..n` outside of `m`, which has 2 elements";
+    let message = "`kind[2]` is 2, so the index of `m[kind[i]]` in the sum over `i in 0..n` is out of range: `m` has 2 elements";
     assert_eq!(told(|model| model.kind[2] = 2), message);
-    let message = "`site[0]` is 3, which takes the index of `x[2*site[b]+1]` in the sum over `b in 0..w` outside of `x`, which has 6 elements";
+    let message = "`site[0]` is 3, so the index of `x[2*site[b]+1]` in the sum over `b in 0..w` is out of range: `x` has 6 elements";
     assert_eq!(told(|model| model.site[0] = 3), message);
     // Of two entries the index is named, with its value.
     let message = "the index of `x[last[b]-site[b]]` in the sum over `b in 0..w` becomes -1, but `x` has 6 elements";

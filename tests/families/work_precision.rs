@@ -344,7 +344,7 @@ fn what_a_family_cannot_run_is_a_failed_point() {
     let csv = measured.to_csv();
     let line = csv.lines().nth(1).unwrap();
     assert!(
-        line.contains("is not available for this model of run-time length"),
+        line.contains("is not supported for this model of run-time length"),
         "{line}"
     );
     // No element of one node exists for any model: nothing is measured.

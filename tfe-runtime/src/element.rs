@@ -379,14 +379,14 @@ impl fmt::Display for ElementError {
         match self {
             Self::Nodes { element } => write!(
                 f,
-                "`{element}` has {} nodes, an element has {} to {}",
+                "`{element}` has {} nodes, but an element must have {} to {}",
                 element.nodes,
                 Element::MIN_NODES,
                 Element::MAX_NODES
             ),
             Self::Points { element, least } => write!(
                 f,
-                "`{element}` integrates with {} points, it needs {least} to {MAX_POINTS}",
+                "the quadrature rule of `{element}` has {} points, but must have {least} to {MAX_POINTS}",
                 element.points()
             ),
         }

@@ -29,18 +29,16 @@ impl fmt::Display for LegendreError {
         match self {
             Self::Singular { coordinate } => write!(
                 f,
-                "the second derivative by velocities (momenta) is singular at coordinate \
-                 {coordinate}"
+                "the matrix of second derivatives with respect to the velocities (momenta) is singular at coordinate {coordinate}"
             ),
             Self::Stalled {
                 iterations,
                 residual,
             } => write!(
                 f,
-                "the velocity (momentum) was not found in {iterations} iterations, residual \
-                 {residual:.1e}"
+                "the velocity (momentum) was not found in {iterations} iterations: the residual is still {residual:.1e}"
             ),
-            Self::NonFinite => f.write_str("the model gave a value that is not finite"),
+            Self::NonFinite => f.write_str("a value of the model or of the state is not finite"),
         }
     }
 }
@@ -98,7 +96,7 @@ impl fmt::Display for ConstraintError {
                 constraint,
             } => write!(
                 f,
-                "`{element}` cannot hold the constraint `{constraint}`; `Mixed::<{}>` can",
+                "`{element}` does not support the constraint `{constraint}`: use `Mixed::<{}>`",
                 element.nodes()
             ),
             Self::Start {
@@ -107,7 +105,7 @@ impl fmt::Display for ConstraintError {
                 residual,
             } => write!(
                 f,
-                "the start violates the constraint `{constraint}`: {} {residual:.1e}; `consistent_state` finds a start that does not",
+                "the start violates the constraint `{constraint}`: {} {residual:.1e}; `consistent_state` finds the nearest start that satisfies it",
                 if *position {
                     "position off by"
                 } else {
@@ -119,22 +117,22 @@ impl fmt::Display for ConstraintError {
                 residual,
             } => write!(
                 f,
-                "the constraints are dependent and `{constraint}`, which should follow from the others, is off by {residual:.1e}: they contradict, or the position is singular"
+                "the constraints are dependent, and `{constraint}`, which should follow from the others, is off by {residual:.1e}: the constraints contradict each other, or the position is singular"
             ),
             Self::NeedsNewton => f.write_str(
-                "constraints are solved by Newton's method, not by the fixed-point iteration",
+                "models with constraints need Newton's method: the fixed-point iteration does not support them",
             ),
             Self::SingularMass => {
-                f.write_str("the kinetic energy is singular for motions that the constraints allow")
+                f.write_str("the mass matrix is singular for motions that the constraints allow")
             }
             Self::DependentRows => f.write_str(
-                "constraints depend on one another, which those of a model of run-time length must not: leave out what follows from the others (or the kinetic energy is singular for motions that they allow)",
+                "the constraints are dependent, which models of run-time length do not support: remove constraints that follow from others (or the mass matrix is singular for motions that they allow)",
             ),
             Self::RankChanged => {
                 f.write_str("the number of independent constraints changes along the motion")
             }
             Self::Parameter => f.write_str(
-                "the model does not number the parameter by which it is to be differentiated",
+                "the model has no derivative with respect to this parameter: it is not in the list of its parameters",
             ),
         }
     }
@@ -232,12 +230,12 @@ impl fmt::Display for StepError {
             Self::Workspace { needed, given } => {
                 write!(
                     f,
-                    "the workspace has {given} numbers, the element needs {needed}"
+                    "the workspace has {given} numbers, but the element needs {needed}"
                 )
             }
-            Self::NonFinite => f.write_str("a value is not finite"),
+            Self::NonFinite => f.write_str("a value of the model or of the state is not finite"),
             Self::SingularTangent { unknown } => {
-                write!(f, "the tangent is singular at unknown {unknown}")
+                write!(f, "the tangent matrix is singular at unknown {unknown}")
             }
             Self::NewtonStalled {
                 iterations,
@@ -245,8 +243,7 @@ impl fmt::Display for StepError {
                 tolerance,
             } => write!(
                 f,
-                "Newton's method stalled: increment {residual:.1e} after {iterations} iterations, \
-                 tolerance {tolerance:.1e}"
+                "Newton's method did not converge: after {iterations} iterations the increment is {residual:.1e}, the tolerance {tolerance:.1e}; take a shorter step"
             ),
             Self::FixedPointStalled {
                 iterations,
@@ -254,22 +251,21 @@ impl fmt::Display for StepError {
                 tolerance,
             } => write!(
                 f,
-                "the fixed-point iteration stalled: increment {residual:.1e} after {iterations} \
-                 iterations, tolerance {tolerance:.1e}"
+                "the fixed-point iteration did not converge: after {iterations} iterations the increment is {residual:.1e}, the tolerance {tolerance:.1e}; take a shorter step"
             ),
             Self::Unproven { ratio } => write!(
                 f,
-                "the iteration wandered (an increment was {ratio:.1e} times the one before) and may have found another root of a long step: take a \
-                 shorter one, or `Solve::Trusting`"
+                "the iteration converged irregularly (an increment was {ratio:.1e} times the one before) and may have found a solution of the equations that is not the motion: \
+                 take a shorter step, or accept any solution with `Solve::Trusting`"
             ),
             Self::EnergyJump { before, after } => write!(
                 f,
-                "the energy, which the model conserves, jumps from {before:.6e} to {after:.6e}: another root of a long step, or a singular point of the model; \
-                 take a shorter step, or `Solve::Trusting`"
+                "the energy, which the model conserves, jumps from {before:.6e} to {after:.6e}: the step found a solution of the equations that is not the motion, or crosses a singular point of the model; \
+                 take a shorter step, or accept any solution with `Solve::Trusting`"
             ),
             Self::Slides => f.write_str(
-                "the motion slides along a jump of a force: on either side of where a `sign`, `select` or the like changes, it is driven back to the other side; \
-                 take a law without the jump, such as tanh(v/w) for sign(v)",
+                "the motion slides along a jump of a force: on either side of a change of a `sign`, `select` or the like, the force drives it back to the other side; \
+                 replace the jump by a continuous law, such as tanh(v/w) for sign(v)",
             ),
             Self::TooManyKinks => f.write_str(
                 "the step crosses kinks or jumps of forces more often than it can be cut: take a shorter step",
@@ -333,15 +329,15 @@ impl fmt::Display for TransitionError {
         match self {
             Self::Element(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
-            Self::NoStep => f.write_str("no step has been done"),
+            Self::NoStep => f.write_str("no step has been taken"),
             Self::MovedImpulse { time } => write!(
                 f,
-                "the impulse at {time} acts inside an element that an event cuts: let one end there, `break_at({time})`"
+                "the impulse at t = {time} acts inside an element that an event cuts: end an element there with `break_at({time})`"
             ),
             Self::Shape { needed, given } => {
                 write!(
                     f,
-                    "the transition matrix needs {needed} numbers, not {given}"
+                    "the memory for the transition matrix has {given} numbers, but the matrix needs {needed}"
                 )
             }
         }

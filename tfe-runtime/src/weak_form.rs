@@ -40,7 +40,9 @@ impl fmt::Display for WeakFormError {
         match self {
             Self::Legendre(error) => error.fmt(f),
             Self::Singular => f.write_str("a matrix of the nodal form is singular"),
-            Self::Shape => f.write_str("the sizes of the nodal form do not fit together"),
+            Self::Shape => {
+                f.write_str("the sizes of the matrices and vectors of the nodal form do not match")
+            }
         }
     }
 }

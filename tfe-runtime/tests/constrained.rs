@@ -500,7 +500,7 @@ fn what_cannot_be_is_told() {
     assert!(
         radau
             .to_string()
-            .contains("`Radau::<3>` cannot hold the constraint `wire`"),
+            .contains("`Radau::<3>` does not support the constraint `wire`"),
         "{radau}"
     );
     let full = step(

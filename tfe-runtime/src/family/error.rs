@@ -126,7 +126,7 @@ impl fmt::Display for ModelError {
         match self {
             Self::NoElements { array } => write!(f, "the array `{array}` has no elements"),
             Self::Length { field, length } => {
-                write!(f, "`{field}` is {length}, but no array has so many elements")
+                write!(f, "`{field}` is {length}, but an array cannot have so many elements")
             }
             Self::EmptyRange { ranges, start, end } => {
                 let sum = sum_over(ranges);
@@ -157,13 +157,13 @@ impl fmt::Display for ModelError {
             } => {
                 write!(
                     f,
-                    "`{list}[{place}]` is {entry}, which takes the index of `{array}[{index}]`"
+                    "`{list}[{place}]` is {entry}, so the index of `{array}[{index}]`"
                 )?;
                 if !ranges.is_empty() {
                     let sum = sum_over(ranges);
                     write!(f, " in {sum}`{ranges}`")?;
                 }
-                write!(f, " outside of `{array}`, which has {length} elements")
+                write!(f, " is out of range: `{array}` has {length} elements")
             }
             Self::FieldLength {
                 field,
@@ -177,7 +177,7 @@ impl fmt::Display for ModelError {
                     let sum = sum_over(ranges);
                     write!(f, " in {sum}`{ranges}`")?;
                 }
-                write!(f, " asks for {expected}")
+                write!(f, " needs {expected}")
             }
             Self::StateLength {
                 vector,
@@ -189,26 +189,28 @@ impl fmt::Display for ModelError {
             ),
             Self::MassNotDiagonal { row, column } => write!(
                 f,
-                "the mass matrix has an entry off its diagonal, ({row}, {column}); models of run-time length need a diagonal one without the feature `sparse`"
+                "the mass matrix has an entry off its diagonal, ({row}, {column}): enable the feature `sparse`, without which models of run-time length need a diagonal mass matrix"
             ),
             Self::SingularMass { coordinate } => write!(
                 f,
                 "the kinetic energy does not depend on the velocity of coordinate {coordinate}"
             ),
-            Self::NoVelocity => f.write_str("no velocity belongs to the momentum there"),
+            Self::NoVelocity => f.write_str(
+                "no velocity belongs to the momentum: is the mass matrix singular there?",
+            ),
             Self::NotSecondOrder => f.write_str(
-                "models of run-time length need a kinetic energy ½ Σ m v² with constant masses; with the feature `sparse` a Lagrangian may have any",
+                "models of run-time length need a kinetic energy ½ Σ m v² with constant masses; with the feature `sparse`, a Lagrangian can have any kinetic energy",
             ),
             Self::Element(error) => error.fmt(f),
             Self::ElementNotSupported { element } => write!(
                 f,
-                "`{element}` is not available for this model of run-time length; take `Mixed`, or any element for a Lagrangian without constraints, given the feature `sparse`"
+                "`{element}` is not supported for this model of run-time length: use `Mixed`; with the feature `sparse`, Lagrangians without constraints support every element"
             ),
             Self::NoNewton => f.write_str(
                 "Newton's method for models of run-time length needs the feature `sparse`",
             ),
             Self::NeedsNewton => f.write_str(
-                "constraints, and kinetic energies other than ½ Σ m v², are solved by Newton's method, not by the fixed-point iteration",
+                "constraints, and kinetic energies other than ½ Σ m v², need Newton's method: the fixed-point iteration does not support them",
             ),
             Self::ConstraintsNotSupported => f.write_str(
                 "constraints of models of run-time length need the feature `sparse` and a Lagrangian",

@@ -40,9 +40,9 @@ impl fmt::Display for OperatorError {
         match self {
             Self::Family(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
-            Self::Cut => f.write_str("the step is so long that it was made in pieces"),
+            Self::Cut => f.write_str("the step had to be divided: take a shorter step"),
             Self::Shape { needed, given } => {
-                write!(f, "the vector needs {needed} numbers, not {given}")
+                write!(f, "the vector has {given} numbers, but needs {needed}")
             }
         }
     }
