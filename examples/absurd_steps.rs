@@ -1,6 +1,17 @@
-//! Steps from sensible to absurd, from random states of several models, with all kinds of elements, against fine runs: how many runs are right, cut, warned of, refused, or
-//! wrong without a word. `cargo run --release --example absurd_steps -- 100000` tries as many;
-//! a second number chooses other random states.
+//! Tests that steps that are far too long give an error or a warning, and not a wrong result without either.
+//!
+//! Random states of six models are run for two steps with elements of all families; the step size is random, from 0.01
+//! (sensible) to 2 (absurd). Each run is compared with one of very short steps. The table counts for each element:
+//!
+//! * `runs`: runs made;
+//! * `cut`: runs in which steps were cut into shorter ones;
+//! * `warned`: runs that ended with a warning; `needless`: those among them whose error was below 1 % of the path;
+//! * `refused`: runs that ended with an error;
+//! * `wrong`: runs without error or warning whose end is off by more than half of the length of the path. If there are
+//!   any, the program fails.
+//!
+//! `cargo run --release --example absurd_steps -- 100000` makes as many runs; a second number is the seed of the random
+//! numbers.
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -43,7 +54,7 @@ struct Rod;
 )]
 struct Duffing;
 
-/// Numbers between 0 and 1, the same in every run.
+/// Uniform random numbers between 0 and 1, the same in every run of the program.
 struct Random(u64);
 
 impl Random {
@@ -56,22 +67,23 @@ impl Random {
     }
 }
 
-/// What has come of the runs of one element.
+/// The counts of the runs of one element; the columns of the table.
 #[derive(Default)]
 struct Count {
     runs: u32,
     cut: u32,
     warned: u32,
-    /// Of those that were warned of: right to a hundredth.
+    /// Runs with a warning although their error is below 1 % of the path.
     needless: u32,
     refused: u32,
     wrong: u32,
 }
 
-/// Elements in a run.
+/// The number of steps in each run.
 const STEPS: f64 = 2.0;
 
-/// A run is wrong if its end is further from that of a fine run than half of the way that the motion takes.
+/// Counts one run. It is wrong if its end differs from that of the run with short steps by more than half of the length
+/// of the path.
 fn examine<M: Model<N>, const N: usize>(
     simulation: &Simulation<'_, M, N>,
     start: State<N>,
@@ -83,7 +95,7 @@ fn examine<M: Model<N>, const N: usize>(
         .clone()
         .element(Mixed::<8>)
         .step((h / 40.0).min(0.01));
-    // Into a singular point: nothing to compare with.
+    // The motion runs into a singularity: there is nothing to compare with.
     let Ok(fine) = fine.run(start, 0.0..end) else {
         return;
     };
@@ -111,11 +123,11 @@ fn examine<M: Model<N>, const N: usize>(
         count.needless += u32::from(off < 0.01 * way);
         return;
     }
-    // An end that is no number is wrong, too.
+    // Written such that a NaN counts as wrong.
     if !(off <= 0.5 * way) {
         count.wrong += 1;
         println!(
-            "wrong: {element}, h = {h:.3} from {start:?}: {:?} for {:?}",
+            "wrong: {element}, h = {h:.3} from {start:?}: {:?} instead of {:?}",
             motion.last().q,
             fine.last().q
         );
@@ -222,7 +234,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}", row("all", &all));
     match all.wrong {
         0 => Ok(()),
-        wrong => Err(format!("{wrong} of {} runs are wrong without a word", all.runs).into()),
+        wrong => Err(format!(
+            "{wrong} of {} runs are wrong without an error or a warning",
+            all.runs
+        )
+        .into()),
     }
 }
 

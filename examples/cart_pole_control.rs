@@ -1,21 +1,24 @@
-//! A pendulum kept upright by the cart that carries it: a loop of control with an input that is held between samples.
+//! An inverted pendulum on a cart, stabilised by sampled feedback: how long may the sampling time be?
 //!
 //! ```text
 //! L = ½ (M + m) ẋ² + m l ẋ θ̇ cos θ + ½ m l² θ̇² − m g l cos θ ,     force on x: u
 //! ```
 //!
-//! θ is measured from the upright. The feedback u = k·(x, ẋ, θ, θ̇) puts the four roots of the linear model at −3 in continuous time. A controller knows the state only when it samples it: the longer the
-//! time between two samples, the later u answers. The run shows how far one may go: the cart is pushed at 4 s, by an impulse, and the table says how long it takes to come back, for samples of 5 ms to 200 ms. Between
-//! two samples the run takes ten steps; u is held.
+//! θ is measured from the upright position. The gains of the feedback u = k·(x, ẋ, θ, θ̇) place the four poles of the
+//! linearised closed loop at −3, in continuous time. A digital controller measures the state at sampling times only,
+//! and holds u constant in between (zero-order hold): the longer the sampling time, the later u reacts. At 4 s an
+//! impulse hits the cart. For sampling times from 5 ms to 200 ms, the table shows how long the pendulum takes to
+//! return, and the largest force; with 200 ms it falls over. The simulation makes ten steps in each sampling time.
 //!
-//! `cargo run --release --example cart_pole_control` writes `cart_pole_control.svg`, or the file that is named behind `--`.
+//! `cargo run --release --example cart_pole_control` writes the chart `cart_pole_control.svg`; give another file name
+//! after `--`.
 
 use std::error::Error;
 use tfe::RunErrorKind;
 use tfe::charts::{Axis, Chart, Style};
 use tfe::prelude::*;
 
-/// A cart with an upright pendulum.
+/// A cart with an inverted pendulum.
 #[dynamics(
     coordinates(x, theta),
     lagrangian = (cart + m)/2*dot(x)^2 + m*l*dot(x)*dot(theta)*cos(theta) + m*l^2/2*dot(theta)^2 - m*g*l*cos(theta),
@@ -38,19 +41,20 @@ const CART: CartPole = CartPole {
     g: 9.81,
 };
 
-/// The roots of the linear model with feedback are all here.
+/// The four poles of the linearised closed loop.
 const ROOT: f64 = 3.0;
 
-/// Steps between two samples.
+/// Steps in each sampling time.
 const STEPS: usize = 10;
 
 const PUSH: f64 = 4.0; // s
 const END: f64 = 12.0; // s
 
-/// The factors of x, ẋ, θ, θ̇ in u. The linear model is M ẍ = u − m g θ and l θ̈ = g θ − ẍ; with y = x + l θ, for which θ = ÿ/g, it is one equation of fourth order in y.
+/// The gains of x, ẋ, θ, θ̇ in u. The linearised model is M ẍ = u − m g θ and l θ̈ = g θ − ẍ. With y = x + l θ, for
+/// which θ = ÿ/g, it is a single equation of fourth order in y.
 fn gains(model: &CartPole) -> [f64; 4] {
     let CartPole { cart, m, l, g } = *model;
-    // y⁗ = g (g (M + m) θ − u)/(M l) = −(c₀ y + c₁ ẏ + c₂ ÿ + c₃ y⃛) with (s + r)⁴.
+    // y⁗ = g (g (M + m) θ − u)/(M l) = −(c₀ y + c₁ ẏ + c₂ ÿ + c₃ y⃛), with the coefficients of (s + r)⁴.
     let [c0, c1, c2, c3] = [
         ROOT.powi(4),
         4.0 * ROOT.powi(3),
@@ -66,10 +70,10 @@ fn gains(model: &CartPole) -> [f64; 4] {
     ]
 }
 
-/// One run: time, place of the tip, force.
+/// The rows of one run: time, position of the tip, force.
 type Rows = Vec<[f64; 3]>;
 
-/// The motion with samples every `sample`, as far as it stays upright.
+/// The motion with one sample every `sample` seconds, as long as the pendulum does not fall.
 fn controlled(sample: f64) -> Result<Rows, RunErrorKind> {
     let gains = gains(&CART);
     let start = CART.state([0.0, 0.2], [0.0, 0.0]);
@@ -113,7 +117,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ => "swings on".to_owned(),
         };
         println!("{:11.0}   {back:>35}   {largest:17.1}", 1e3 * sample);
-        // An independent simulation, by the method of Runge and Kutta, gives 2.7 to 3.3 s.
+        // An independent simulation with a Runge–Kutta method gives 2.7 to 3.3 s.
         let returned = away.map_or(0.0, |[t, ..]| t - PUSH);
         assert_eq!(fell, sample > 0.15, "samples every {sample} s");
         assert!(fell || (2.5..3.5).contains(&returned), "{returned} s");
@@ -123,12 +127,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let mut chart = Chart::new("An upright pendulum on a cart, pushed at 4 s")
         .x(Axis::new("t (s)"))
-        .y(Axis::new("place of the tip (m)"));
+        .y(Axis::new("position of the tip (m)"));
     for (sample, rows) in &shown {
         let points = rows.iter().map(|[t, tip, _]| (*t, *tip));
         let points: Vec<_> = points.collect();
         chart = chart.series(
-            format!("samples every {:.0} ms", 1e3 * sample),
+            format!("sampling time {:.0} ms", 1e3 * sample),
             Style::Line,
             points,
         );
@@ -136,6 +140,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1);
     let path = path.unwrap_or_else(|| "cart_pole_control.svg".to_owned());
     chart.save(&path)?;
-    println!("{path}: the tip");
+    println!("chart of the position of the tip: {path}");
     Ok(())
 }

@@ -1,10 +1,15 @@
-//! Halley's comet through its perihelion, with steps that shorten as it falls towards the Sun.
+//! Halley's comet through its perihelion, with steps that become shorter as it approaches the Sun (time
+//! transformation).
 //!
-//! H = p²/2 − μ/r, per unit of mass, in astronomical units and years: μ = 4π². Orbit of 1P/Halley, rounded: semi-major axis 17.834 au,
-//! eccentricity 0.96714; it is 0.59 au from the Sun at perihelion and 35.1 au at aphelion, where the run begins. Steps are equal in τ,
-//! dt = r^k dτ: k = 0 leaves the time as it is, and with k = 3/2 steps go with the period of the circle through each point.
+//! H = p²/2 − μ/r per unit of mass, in astronomical units and years: μ = 4π². The orbit is that of 1P/Halley, rounded:
+//! semi-major axis 17.834 au, eccentricity 0.96714. Its distance from the Sun is 0.59 au at perihelion, and 35.1 au at
+//! aphelion, where the run begins. Steps are equal in a fictitious time τ with dt = r^k dτ. For k = 0, τ is the time
+//! itself, so that steps are equal in t; with k = 3/2 they are proportional to the period of the circular orbit through
+//! the current position.
 //!
-//! The table holds the error of the position after one revolution, against the ellipse at the time that the run has reached.
+//! The table shows the error of the position after one revolution against the Kepler ellipse at the time reached, for k
+//! = 0 (column `dt`), 1 (`r dτ`) and 3/2 (`r^1.5 dτ`). At equal numbers of steps, the transformed runs are more than a
+//! thousand times as accurate as equal steps in t (800 steps); “failed” means that a step was too long to be solved.
 
 use std::error::Error;
 use std::f64::consts::{PI, TAU};
@@ -27,7 +32,7 @@ struct Comet {
     k: f64,
 }
 
-/// The position on the ellipse at a time from aphelion; Kepler's equation M = u − e sin u, by bisection.
+/// The position on the ellipse at a time since aphelion; Kepler's equation M = u − e sin u is solved by bisection.
 fn position(t: f64) -> [f64; 2] {
     let mean = (t * (MU / A.powi(3)).sqrt() + PI).rem_euclid(TAU);
     let (mut low, mut high) = (0.0, TAU);
@@ -43,7 +48,8 @@ fn position(t: f64) -> [f64; 2] {
     [A * (cos - E), A * (1.0 - E * E).sqrt() * sin]
 }
 
-/// τ of one revolution, ∫ dt/r^k with dt = √(a/μ) r du; the midpoint rule converges exponentially.
+/// The length of one revolution in τ, ∫ dt/r^k with dt = √(a/μ) r du. For this periodic integrand the midpoint rule
+/// converges exponentially.
 fn revolution(k: f64) -> f64 {
     let points = 2000;
     let h = TAU / f64::from(points);
@@ -51,7 +57,7 @@ fn revolution(k: f64) -> f64 {
     (A / MU).sqrt() * h * (0..points).map(rate).sum::<f64>()
 }
 
-/// The error after one revolution in au; none where a step cannot be solved.
+/// The error of the position after one revolution, in au; `None` if a step cannot be solved.
 fn error(k: f64, steps: u32) -> Option<f64> {
     let comet = Comet { mu: MU, k };
     let speed = (MU / A * (1.0 - E) / (1.0 + E)).sqrt();

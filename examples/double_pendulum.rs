@@ -1,4 +1,4 @@
-//! A double pendulum with every element: what was derived, error against step, energy error, time per step, a chart.
+//! A double pendulum with every element: error against step size, energy error, time per step.
 //!
 //! Two point masses on massless rods, released at rest from θ = (0.5, −0.3):
 //!
@@ -6,7 +6,10 @@
 //! L = m₁/2 |ẋ₁|² + m₂/2 |ẋ₂|² − g (m₁ y₁ + m₂ y₂),   x₁ = l₁ (sin θ₁, −cos θ₁),   x₂ = x₁ + l₂ (sin θ₂, −cos θ₂)
 //! ```
 //!
-//! The reference at t = 10 s was computed by extrapolation at two step sizes that agree to the digits given.
+//! The output is: what was derived from the Lagrangian; for each element and step size the error of the angles at t =
+//! 10 s, the energy error, the time and the iterations per step; the observed orders, which are checked against the
+//! theory; and a chart of errors over step sizes. The reference was computed by extrapolation with two step sizes,
+//! which agree to the digits given.
 
 use std::error::Error;
 use std::time::Instant;
@@ -37,7 +40,7 @@ const STEPS: [f64; 7] = [0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002];
 
 struct Curve {
     element: Element,
-    /// (step, error) of each run.
+    /// (step size, error) of each run.
     points: Vec<(f64, f64)>,
 }
 
@@ -64,7 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let clock = Instant::now();
             let motion = match simulation.run(start, 0.0..END) {
                 Ok(motion) => motion,
-                // A step beyond what the element bears: say so and go on with the next one.
+                // The step is too long for this element: report it and try the next one.
                 Err(error) => {
                     println!("{:<26} {step:>6} {error}", element.to_string());
                     continue;
@@ -108,7 +111,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The slope of log(error) over log(step) between the last two errors that are far above the digits of the reference; NaN where there are none.
+/// The observed order: the slope of log(error) over log(step size) between the last two errors that are well above the
+/// accuracy of the reference; NaN if there are no such two.
 fn order(points: &[(f64, f64)]) -> f64 {
     let above = |(_, error): &(f64, f64)| !(*error <= 1e-10);
     let points: Vec<(f64, f64)> = points.iter().copied().filter(above).collect();
@@ -129,10 +133,10 @@ fn elements() -> Vec<Element> {
     ]
 }
 
-/// Error against step, both logarithmic: the slope of a curve is the order of its element.
+/// Error over step size, both on logarithmic axes: the slope of each curve is the order of its element.
 fn chart(curves: Vec<Curve>) -> Chart {
     let chart = Chart::new("Double pendulum, t = 10 s")
-        .x(Axis::new("step (s)").scale(Scale::Logarithmic))
+        .x(Axis::new("step size (s)").scale(Scale::Logarithmic))
         .y(Axis::new("error of the angles (rad)").scale(Scale::Logarithmic));
     curves.into_iter().fold(chart, |chart, curve| {
         let name = curve.element.to_string();

@@ -1,8 +1,14 @@
-//! Thousands of starts: one by one, eight side by side in lanes, and on all processors.
+//! Ensembles: thousands of initial states, computed one by one, eight at a time in SIMD lanes, and on all cores.
 //!
-//! A pendulum from rest at 4096 angles, declared by L and by H, Hénon and Heiles' stars on 4096 orbits (M. Hénon, C. Heiles, The applicability of
-//! the third integral of motion, Astronomical Journal 69 (1964) 73–79) and a double pendulum, whose mass matrix changes. All units are natural ones.
-//! Times are the smallest of seven, all kinds taken in turn in one run; ratios depend on the processor, and on what else it does.
+//! The models are a pendulum released at rest from 4096 angles, declared by a Lagrangian and by a Hamiltonian, 4096
+//! orbits of the Hénon–Heiles system (M. Hénon, C. Heiles, The applicability of the third integral of motion,
+//! Astronomical Journal 69 (1964) 73–79), and a double pendulum, whose mass matrix depends on the configuration. Units
+//! are natural ones.
+//!
+//! The table shows nanoseconds per step, the speed-up of each way over the way before it, and the largest difference
+//! between the ends of the runs in lanes and of single runs. Times are the smallest of seven, with all ways measured in
+//! turn; the ratios depend on the processor and its load. The last line compares an ensemble of parameter sets with one
+//! of initial states.
 
 use std::error::Error;
 use std::time::{Duration, Instant};
@@ -27,7 +33,7 @@ struct HenonHeiles;
 )]
 struct DoublePendulum;
 
-/// The same with masses and lengths of its own; SI units.
+/// A double pendulum whose masses and lengths are parameters; SI units.
 #[dynamics(
     coordinates(theta1, theta2),
     let x1 = l1 * sin(theta1),
@@ -44,14 +50,14 @@ struct Links {
     g: f64,
 }
 
-// Times of a program that was not optimised say little.
+// Without optimisation, times are not meaningful: one run is enough.
 const STARTS: usize = if cfg!(debug_assertions) { 256 } else { 4096 };
 const ROUNDS: usize = if cfg!(debug_assertions) { 1 } else { 7 };
 const STEP: f64 = 0.1;
 const END: f64 = 5.0;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    println!("ns a step, and how many times faster than the column before");
+    println!("nanoseconds per step, and the speed-up over the column before");
     println!(
         "{:<18} {:>10} {:>10} {:>6} {:>10} {:>6} {:>11}",
         "model", "one by one", "in lanes", "", "all cores", "", "difference"
@@ -66,7 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     study()
 }
 
-/// As many parameter sets as starts of one model: lanes serve both.
+/// Compares the time for many parameter sets with that for as many initial states of one model; both use lanes.
 fn study() -> Result<(), Box<dyn Error>> {
     const SETS: u32 = if cfg!(debug_assertions) {
         1000
@@ -99,7 +105,7 @@ fn study() -> Result<(), Box<dyn Error>> {
     }
     let [same, varied] = best.map(|time| time.as_secs_f64());
     println!(
-        "\n{SETS} parameter sets of a double pendulum: {varied:.2} s, {:.2} times as long as one model from as many starts",
+        "\n{SETS} parameter sets of a double pendulum: {varied:.2} s, {:.2} times the time of one model from as many initial states",
         varied / same
     );
     Ok(())
@@ -122,7 +128,7 @@ where
     let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let ensemble = Ensemble::new(model).element(Mixed::<6>).step(STEP);
     let simulation = Simulation::new(model).element(Mixed::<6>).step(STEP);
-    // The ends alone, as from an ensemble.
+    // Only the end states, as an ensemble returns them.
     let simulation = simulation.record_every(usize::MAX);
     let mut best = [Duration::MAX; 3];
     let mut difference = 0.0_f64;
@@ -142,12 +148,15 @@ where
         let on_all = ensemble.run(starts, 0.0..END)?;
         best[2] = best[2].min(clock.elapsed());
 
-        assert_eq!(in_lanes, on_all, "processors must not matter");
+        assert_eq!(
+            in_lanes, on_all,
+            "the number of cores must not change the results"
+        );
         for (end, single) in in_lanes.iter().zip(&single) {
             let end = end.as_ref().map_err(Clone::clone)?;
             for a in 0..N {
                 let off = [end.q[a] - single.q[a], end.p[a] - single.p[a]].map(f64::abs);
-                // `max` would drop a NaN.
+                // `max` would ignore a NaN.
                 assert!(!off[0].is_nan() && !off[1].is_nan(), "{end:?}");
                 difference = difference.max(off[0]).max(off[1]);
             }
@@ -163,6 +172,9 @@ where
         all * per_step,
         lanes / all
     );
-    assert!(difference <= 1e-13, "lanes must follow single runs");
+    assert!(
+        difference <= 1e-13,
+        "runs in lanes must agree with single runs"
+    );
     Ok(())
 }

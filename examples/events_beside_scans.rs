@@ -1,6 +1,13 @@
-//! Random events of random motions beside scans of the same motions in thousands of places: how many are missed, how many invented. Steps resolve the motions: where they do
-//! not, velocities of polynomials jump at nodes, and what is between nodes is none of the times at which elements end.
-//! `cargo run --release --example events_beside_scans -- 100000` tries as many runs.
+//! Tests the detection of events: counts events that are missed, and events that are reported but do not exist.
+//!
+//! Random motions of two models are run with one of several event functions. The result is compared with a scan, which
+//! evaluates the event function of the motion at 8000 equally spaced times and looks for changes of sign. The printed
+//! tally counts the runs, the events found, the `pairs` of events closer together than the spacing of the scan could
+//! resolve, and the `missed` and `invented` events; the program fails if there are any of the last two. All step sizes
+//! resolve the motion. If they did not, the velocities of the interpolating polynomials would jump at the nodes, and
+//! the polynomials would differ from the elements that end at the events.
+//!
+//! `cargo run --release --example events_beside_scans -- 100000` makes as many runs.
 
 use std::error::Error;
 use tfe::prelude::*;
@@ -46,22 +53,22 @@ const EVENTS: [&str; 7] = [
     "linear", "wave", "product", "distance", "jump", "clock", "angle",
 ];
 
-/// What has come of some runs.
+/// The counts of a number of runs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tally {
     /// Runs.
     pub runs: usize,
-    /// Events that were met.
+    /// Events found.
     pub events: usize,
-    /// Among them pairs closer to one another than two places of the scan.
+    /// Of these, pairs of successive events closer than twice the spacing of the scan.
     pub pairs: usize,
-    /// Changes of sign between two places of a scan without an event between them.
+    /// Changes of sign between two times of the scan, without an event between them.
     pub missed: usize,
-    /// Events without a change of sign.
+    /// Events between two times of the scan, without a change of sign.
     pub invented: usize,
 }
 
-/// Random numbers between −1 and 1.
+/// Uniform random numbers between −1 and 1.
 pub struct Random(pub u64);
 
 impl Random {
@@ -77,7 +84,7 @@ impl Random {
     }
 }
 
-/// A run of one of the models with one of its events, beside a scan.
+/// Runs one of the models with one of its events, compares with a scan, and adds to the tally.
 pub fn run(number: usize, random: &mut Random, tally: &mut Tally) -> Result<(), Box<dyn Error>> {
     let [a, b, c, d] = random.four();
     let [q0, q1, p0, p1] = random.four();
@@ -124,7 +131,8 @@ fn compare<M: Model<2> + Send + Sync>(
 ) -> Result<(), Box<dyn Error>> {
     const END: f64 = 10.0;
     const PLACES: usize = 8000;
-    /// Times of events are those of elements that end there, which differ from the polynomials that are scanned.
+    /// Times of the scan closer than this to an event are skipped: an event is found by an element that ends there,
+    /// which differs slightly from the interpolating polynomial that is scanned.
     const NEAR: f64 = 0.01;
 
     let step = [0.05, 0.1, 0.2][number % 3];
@@ -148,7 +156,7 @@ fn compare<M: Model<2> + Send + Sync>(
         .windows(2)
         .filter(|two| two[1] - two[0] < 2.0 * spacing)
         .count();
-    // From one place to the next of those that are not near an event.
+    // Compare successive times of the scan, without those near an event.
     let mut last: Option<(f64, usize)> = None;
     for k in 0..=PLACES {
         let t = spacing * k as f64;
@@ -167,7 +175,7 @@ fn compare<M: Model<2> + Send + Sync>(
                 (false, 1) => tally.invented += 1,
                 _ => {}
             }
-            // Between the first and the second of a pair the sign is the other one.
+            // Two events without a change of sign outside: between them the sign must be opposite.
             for two in between.as_chunks::<2>().0 {
                 let inside = value(0.5 * (two[0] + two[1]))?;
                 let is_it = there * inside < 0.0 || inside.abs() < 1e-4;
@@ -179,7 +187,10 @@ fn compare<M: Model<2> + Send + Sync>(
     Ok(())
 }
 
-#[allow(dead_code, reason = "a test calls the rest")]
+#[allow(
+    dead_code,
+    reason = "a test includes this file and calls the other functions"
+)]
 fn main() -> Result<(), Box<dyn Error>> {
     let count = match std::env::args().nth(1) {
         Some(count) => count.parse()?,
@@ -195,6 +206,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{tally:?}");
     match tally.missed + tally.invented {
         0 => Ok(()),
-        wrong => Err(format!("{wrong} events are missed or invented").into()),
+        wrong => Err(format!("{wrong} events are missed or do not exist").into()),
     }
 }

@@ -1,20 +1,25 @@
-//! An oscillator that hits a wall: its periodic orbits, in closed form and as found.
+//! Periodic orbits of an oscillator that hits a wall, compared with their closed form.
 //!
 //! ```text
 //! x″ + x = F cos ωt ,     x ≤ 0 ,     ẋ⁺ = −e ẋ⁻   at x = 0
 //! ```
 //!
-//! S. W. Shaw and P. J. Holmes (1983) follow motions with one impact in n periods of the forcing. With γ = F/(1 − ω²), T = 2πn/ω and x = a cos t + b sin t + γ cos(ωt + ψ) from an impact on,
+//! S. W. Shaw and P. J. Holmes (1983) give the motions with one impact in n periods of the forcing. With γ = F/(1 −
+//! ω²), T = 2πn/ω, and x = a cos t + b sin t + γ cos(ωt + ψ) from the impact on,
 //!
 //! ```text
 //! b² (cot² T/2 + ((1 − e)/((1 + e) ω))²) = γ² ,     a = b cot T/2 ,     γ ω sin ψ = b (1 − e)/(1 + e) ,     ẋ⁻ = −2 b/(1 + e)
 //! det M = e² ,     tr M = −2 e cos T + (1 + e) F cos ψ sin T/ẋ⁻
 //! ```
 //!
-//! with the matrix M that a small change of the orbit is multiplied by in a period: the saltation at the impact included, without which M had the determinant 1. The table shows impacts
-//! and multipliers, by how much they are off, and whether an orbit is stable. It is where |μ| = e; where both are real and one leaves the unit circle through −1, the period doubles.
+//! M is the monodromy matrix, by which a small deviation from the orbit is multiplied in one period; it includes the
+//! jump at the impact (saltation matrix), without which its determinant would be 1. The table shows for each orbit the
+//! Newton corrections, the speed at the impact and the largest modulus of the multipliers (eigenvalues of M), each with
+//! its error, and the stability. An orbit is stable if all multipliers lie within the unit circle: a complex pair
+//! always does, with |μ| = e. Where a real one leaves the circle through −1, the period doubles.
 //!
-//! `cargo run --release --example impact_oscillator_orbit` writes `impact_oscillator_orbit.svg`, or the file that is named behind `--`.
+//! `cargo run --release --example impact_oscillator_orbit` writes the chart `impact_oscillator_orbit.svg`; give another
+//! file name after `--`.
 
 use nalgebra::Complex;
 use std::error::Error;
@@ -35,7 +40,8 @@ struct ImpactOscillator {
 
 const RESTITUTION: f64 = 0.8;
 
-/// The closed form: the speed at the impact, the largest multiplier; a state in the middle of the flight and its time.
+/// The closed form: the velocity before the impact, the modulus of the largest multiplier, and a state in the middle of
+/// the flight with its time and the period.
 struct Exact {
     impact: f64,
     multiplier: f64,
@@ -74,7 +80,7 @@ fn orbit(model: &ImpactOscillator, exact: &Exact) -> Result<HybridOrbit<1>, Box<
             .on("wall", Crossing::Falling, |event| {
                 Act::Restart(event.after_impact(RESTITUTION))
             });
-    // Found from a hundredth beside.
+    // Newton's method starts with an offset from the exact state.
     let [x, v] = exact.state;
     let orbit = PeriodicOrbit::of_simulation(&simulation)
         .start_time(exact.from)
@@ -88,7 +94,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut chart = Chart::new("Orbits of an oscillator that hits a wall")
         .x(Axis::new("x"))
         .y(Axis::new("dx/dt"));
-    println!("periods     ω   corrections   speed at the wall    off by   largest |μ|    off by");
+    println!("periods     ω   corrections   speed at the wall     error   largest |μ|     error");
     for (n, omega) in [(1.0, 2.2), (1.0, 2.6), (1.0, 2.8), (2.0, 4.4), (2.0, 4.1)] {
         let model = ImpactOscillator { f: 1.0, omega };
         let exact = exact(model.f, omega, n);

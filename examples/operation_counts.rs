@@ -1,11 +1,14 @@
-//! How much arithmetic the kernels need, on models whose counts are published for other symbolic tools.
+//! The number of arithmetic operations in the kernels, for models whose counts are published for other symbolic tools.
 //!
-//! L, its gradient and the upper half of its Hessian together, in x = (q, q̇), all constants numbers: additions and subtractions /
-//! multiplications / divisions / sine or cosine evaluations. Negations are not counted. A sine and a cosine of one argument are one evaluation
-//! of the pair here, two in the published columns. Weights: addition 1, multiplication 1, division 6, a sine–cosine pair 25.
+//! Counted are L, its gradient and the upper half of its Hessian together, by x = (q, q̇), with all constants as
+//! numbers. A cell of the table shows additions and subtractions / multiplications / divisions / evaluations of sine or
+//! cosine (weighted sum). Negations are not counted. A sine and a cosine of the same argument are two evaluations, as
+//! in the published columns. In the weighted sum an addition counts 1, a multiplication 1, a division 6 and a pair of
+//! sine and cosine 25; the kernels here evaluate such a pair at once.
 //!
-//! Sine and cosine of a difference of angles follow from those of the angles, with four products and two sums: that is why the links need
-//! more products here, and far fewer evaluations.
+//! The kernels here compute the sine and cosine of a difference of angles from those of the angles, with four products
+//! and two sums. This is why the chains of links need more products than with the other tools, but far fewer
+//! evaluations of sine and cosine.
 
 use std::error::Error;
 use tfe_symbolic::compile::declare;
@@ -13,14 +16,14 @@ use tfe_symbolic::derive::derivation::Derivation;
 use tfe_symbolic::program::Request;
 use tfe_symbolic::syntax::context::Context;
 
-/// A model: its name, its declaration, and the counts of SymPy's cse (the better of with and without basic optimisations), CasADi's SX with
-/// cse, SymForce's cse.
+/// A model: its name, its declaration, and the counts of SymPy (`cse`, the better result with and without basic
+/// optimisations), CasADi (SX with `cse`) and SymForce (`cse`).
 pub struct Model {
-    /// What it is called.
+    /// The name in the table.
     pub name: &'static str,
-    /// What stands in `#[dynamics(…)]`.
+    /// The arguments of `#[dynamics(…)]`.
     pub declaration: &'static str,
-    /// Additions, multiplications, divisions, sine and cosine evaluations by each tool.
+    /// Additions, multiplications, divisions, and evaluations of sine or cosine, for each tool.
     pub published: [[usize; 4]; 3],
 }
 
@@ -62,7 +65,8 @@ pub const MODELS: [Model; 5] = [
     },
 ];
 
-/// Additions, multiplications, divisions, and sine and cosine evaluations (two for a pair, as the published columns count them).
+/// Additions, multiplications, divisions, and evaluations of sine or cosine, where a pair counts as two, as in the
+/// published columns.
 pub fn counted(model: &Model) -> Result<[usize; 4], Box<dyn Error>> {
     let context = Context {
         struct_name: "Model".to_owned(),
@@ -89,13 +93,13 @@ pub fn counted(model: &Model) -> Result<[usize; 4], Box<dyn Error>> {
     ])
 }
 
-/// The weighted sum: a pair of sine and cosine costs 25.
+/// The weighted sum, in which a pair of sine and cosine counts 25.
 pub fn weighted(counts: [usize; 4]) -> f64 {
     let [additions, multiplications, divisions, evaluations] = counts.map(|count| count as f64);
     additions + multiplications + 6.0 * divisions + 12.5 * evaluations
 }
 
-/// The smallest weighted sum that any of the other tools reaches.
+/// The smallest weighted sum of the other tools.
 pub fn least_published(model: &Model) -> f64 {
     model
         .published
@@ -120,7 +124,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
         assert!(
             weighted(here) < least_published(model),
-            "{} needs more than a published count",
+            "{} needs more operations than the best published count",
             model.name
         );
     }

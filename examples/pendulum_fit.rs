@@ -1,14 +1,16 @@
-//! A pendulum that was filmed: its length and its two kinds of friction, found from noisy angles.
+//! Identification of a filmed pendulum: its length and two coefficients of friction from noisy angles.
 //!
 //! ```text
 //! m l² θ̈ = −m g l sin θ − c θ̇ − d l³ |θ̇| θ̇
 //! ```
 //!
-//! The decay of large swings is due to the drag of the air, d, that of small ones to the bearing, c: one film of both tells them apart. Angles are taken every 40 ms from a motion with known
-//! parameters, with errors of the standard deviation 0.01 rad; the release (angle and momentum at the first picture) is not known either. The table shows what was found beside the truth, in units of the
-//! deviation that the fit itself tells.
+//! Large swings decay by the drag of the air, d, and small ones by the friction in the bearing, c; a film that shows
+//! both determines both coefficients. The angles are computed every 40 ms from a motion with known parameters, and
+//! noise with a standard deviation of 0.01 rad is added. The initial angle and momentum are not known either. The table
+//! shows the true and the fitted values, and the error in units of the standard deviation that the fit estimates: it
+//! should rarely exceed ±2.
 //!
-//! `cargo run --release --example pendulum_fit` writes `pendulum_fit.svg`, or the file that is named behind `--`.
+//! `cargo run --release --example pendulum_fit` writes the chart `pendulum_fit.svg`; give another file name after `--`.
 
 use std::error::Error;
 use tfe::charts::{Axis, Chart, Style};
@@ -32,7 +34,7 @@ const STEP: f64 = 0.04;
 const PICTURES: u32 = 500;
 const NOISE: f64 = 0.01;
 
-/// Normal numbers of the deviation one, the same in every run.
+/// Random numbers of the standard normal distribution, the same in every run of the program.
 fn noise() -> impl Iterator<Item = f64> {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     let mut uniform = move || {
@@ -41,7 +43,7 @@ fn noise() -> impl Iterator<Item = f64> {
         state ^= state << 17;
         (state >> 11) as f64 / (1_u64 << 53) as f64
     };
-    // The sum of twelve uniform numbers has the variance one.
+    // The sum of twelve uniform random numbers has variance one.
     std::iter::repeat_with(move || (0..12).map(|_| uniform()).sum::<f64>() - 6.0)
 }
 
@@ -84,17 +86,21 @@ fn main() -> Result<(), Box<dyn Error>> {
             .output_within("angle", &times[..pictures], &filmed[..pictures], NOISE)
             .solve()
     };
-    // After twenty seconds the first guess is half a swing off: of such a distance least squares learn little. So the first three seconds make a better guess.
+    // After twenty seconds, the motion of the first guess is half a swing behind, which is too far for least squares to
+    // converge. So the first three seconds are fitted first, for a better guess.
     let early = fitted(&guess, release, 75)?;
     let fit = fitted(early.model(), early.start(), filmed.len())?;
     println!("{early}\n\n{fit}\n");
-    println!("          truth       found   off by (deviations)");
+    println!("          truth       found   error (standard deviations)");
     for name in ["l", "c", "d"] {
         let index = truth.find_parameter(name).ok_or("a parameter")?;
         let (exact, found) = (truth.parameter(index), fit.value(name).ok_or("found")?);
         let off = (found - exact) / fit.deviation(name).ok_or("found")?;
         println!("{name}  {exact:12.5}  {found:10.5}  {off:+.2}");
-        assert!(off.abs() < 4.0, "`{name}` is off by {off} deviations");
+        assert!(
+            off.abs() < 4.0,
+            "`{name}` has an error of {off} standard deviations"
+        );
     }
 
     let first = run(&guess, release)?;

@@ -1,7 +1,8 @@
-//! From a formula to the program that is emitted, as text: the declaration, what was derived, and each kernel.
+//! Shows how a declaration becomes code, as text: the declaration as parsed, what was derived from it, and the
+//! operations of each kernel.
 //!
-//! `cargo run --example show_kernel` shows a pendulum on a cart; pass a declaration and the names of the parameters to see another one:
-//! `cargo run --example show_kernel -- 'coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2' m k`.
+//! `cargo run --example show_kernel` shows a pendulum on a cart. Pass a declaration and the names of its parameters to
+//! see another model: `cargo run --example show_kernel -- 'coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2' m k`.
 
 use std::error::Error;
 use tfe_symbolic::compile::declare;
@@ -38,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             for diagnostic in diagnostics {
                 eprintln!("{}", diagnostic.render(&text));
             }
-            return Err("the declaration has mistakes".into());
+            return Err("the declaration has errors".into());
         }
     };
     println!("{declared}\n");

@@ -1,7 +1,9 @@
-//! An emitted solver beside the generic path: the same motion, time per step, memory.
+//! An emitted solver compared with the general stepper: results, time per step, memory.
 //!
-//! `solver(Name, Mixed::<4>)` emits a stepper for one model and one element. Its sizes and tables are constants and its memory is the struct itself,
-//! so it runs without an allocator. Times are the smallest of many repetitions of both, taken in turn in one run.
+//! `solver(Name, Mixed::<4>)` emits a stepper for one model and one element. Its sizes and tables are constants and all
+//! of its memory is in the struct itself, so that it needs no allocator. The table shows the size of the struct, the
+//! nanoseconds per step of both and their ratio, and the difference of the end states, which is at most rounding. Times
+//! are the smallest of many repetitions, with both measured in turn.
 
 use std::error::Error;
 use std::hint::black_box;
@@ -83,7 +85,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
         assert!(
             difference <= 1e-13,
-            "the emitted solver must follow the generic path"
+            "the emitted solver must agree with the general stepper"
         );
     }
     Ok(())

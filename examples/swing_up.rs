@@ -1,14 +1,18 @@
-//! A pole on a cart, swung up by the force that costs least.
+//! Optimal control: a pole on a cart, swung up with the least ∫ u² dt.
 //!
 //! ```text
 //! L = ½ (M + m) ẋ² + m l ẋ θ̇ cos θ + ½ m l² θ̇² + m g l cos θ ,     force on x: u ,     ∫₀² u² dt → min
 //! ```
 //!
-//! From hanging at rest to standing at rest, one metre further, in two seconds (M. Kelly, *An introduction to trajectory optimization*, SIAM Review 59 (2017), section 6, whose bounds
-//! are not reached). The force is a polynomial in each element, and element, force and multipliers converge together. The table says how: the cost with an order of six, and beside it what the
-//! discrete motion keeps. Gravity has no horizontal part, so the horizontal momentum is the impulse of the force, to the last digits with the coarsest elements; the work of the force is the energy gained.
+//! The pole hangs at rest and has to stand at rest, one metre further, after two seconds (M. Kelly, *An introduction to
+//! trajectory optimization*, SIAM Review 59 (2017), section 6; the bounds given there are not active and are left out).
+//! The force is a polynomial in each element. The table shows how the discrete optimum converges with the number of
+//! elements: the cost and its relative difference from that of 160 elements, which falls with order six; the energy
+//! gained minus the work of the force; and the change of the horizontal momentum minus the impulse of the force.
+//! Gravity has no horizontal component, so that the two are equal: discretely, too, and up to rounding even with the
+//! coarsest elements.
 //!
-//! `cargo run --release --example swing_up` writes `swing_up.svg`, or the file that is named behind `--`.
+//! `cargo run --release --example swing_up` writes the chart `swing_up.svg`; give another file name after `--`.
 
 use std::error::Error;
 use std::f64::consts::PI;
@@ -16,7 +20,7 @@ use tfe::Optimum;
 use tfe::charts::{Axis, Chart, Style};
 use tfe::prelude::*;
 
-/// A cart with a pole; θ from the downward vertical.
+/// A cart with a pole; θ is measured from the downward vertical.
 #[dynamics(
     coordinates(x, theta),
     lagrangian = (cart + m)/2*dot(x)^2 + m*l*dot(x)*dot(theta)*cos(theta) + m*l^2/2*dot(theta)^2 + m*g*l*cos(theta),
@@ -56,7 +60,8 @@ fn swung_up(elements: usize) -> Result<Optimum<2>, Box<dyn Error>> {
     Ok(best)
 }
 
-/// By how much the energy gained is not the work, and the momentum not the impulse, at the worst of the nodes. By `total_cmp` a NaN is worse than all numbers.
+/// The largest differences, over all nodes, between energy gained and work, and between momentum and impulse.
+/// `total_cmp` treats a NaN as the largest number, so that it is not lost.
 fn defects(best: &Optimum<2>) -> Result<[f64; 2], Box<dyn Error>> {
     let (motion, driven) = (best.motion(), best.steered(&CART));
     let work = motion.integral(&driven, "power")?;
@@ -73,7 +78,7 @@ fn defects(best: &Optimum<2>) -> Result<[f64; 2], Box<dyn Error>> {
 fn main() -> Result<(), Box<dyn Error>> {
     let finest = swung_up(160)?;
     println!(
-        "elements   iterations   ∫ u² dt (N² s)   off by (relative)   energy − work (J)   momentum − impulse (N s)"
+        "elements   iterations   ∫ u² dt (N² s)      relative error   energy − work (J)   momentum − impulse (N s)"
     );
     for elements in [10, 20, 40, 80] {
         let best = swung_up(elements)?;
@@ -86,7 +91,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         );
         assert!(momentum < 1e-12, "{momentum:e} N s");
         assert!(elements < 40 || off < 1e-6, "{off:e}");
-        // The force gives and takes some ten joules. Of them 80 elements leave less than a millionth, with order six.
+        // The force transfers some ten joules back and forth; with order six, 80 elements have an error below a
+        // hundred-thousandth of that.
         assert!(elements < 80 || energy < 1e-4, "{energy:e} J");
     }
     let at = |t: f64| finest.motion().at(t);
@@ -106,7 +112,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     let worth = finest.multipliers()[0].q[0];
     println!(
-        "a start one centimetre nearer would change the cost by {:+.3} N² s",
+        "starting one centimetre closer would change the cost by {:+.3} N² s",
         0.01 * worth
     );
 
@@ -128,6 +134,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1);
     let path = path.unwrap_or_else(|| "swing_up.svg".to_owned());
     chart.save(&path)?;
-    println!("{path}: the pole on its way");
+    println!("chart of the path of the pole: {path}");
     Ok(())
 }
