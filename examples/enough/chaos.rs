@@ -1,17 +1,17 @@
-//! How far a chaotic motion can be had.
+//! For how long a chaotic motion can be computed.
 
 use std::error::Error;
 use tfe::charts::{Axis, Chart, Scale, Section, Style};
 use tfe::prelude::*;
 
-/// Two equal point masses on rods of one metre; angles from the downward vertical.
+/// Two equal point masses on massless rods of one metre; angles are measured from the downward vertical.
 #[dynamics(
     coordinates(a, b),
     lagrangian = dot(a)^2 + dot(b)^2/2 + dot(a)*dot(b)*cos(a - b) + 9.81*(2*cos(a) + cos(b)),
 )]
 struct DoublePendulum;
 
-/// Both arms nearly upright: errors grow by e in about a third of a second.
+/// Both links nearly upright. From there, errors grow by a factor of e in about a third of a second.
 pub fn section() -> Result<Section, Box<dyn Error>> {
     let start = DoublePendulum.state([3.0, 3.1], [0.0, 0.0]);
     let mut chart = Chart::new("A double pendulum from nearly upright: estimated error")
@@ -33,14 +33,14 @@ pub fn section() -> Result<Section, Box<dyn Error>> {
             Err(error) => error.to_string(),
         };
         println!("double pendulum, {asked:.0e} over {end} s: {said}");
-        // Over 40 s even roundings grow by e¹²⁰.
+        // Over 40 s even rounding errors grow by a factor of e¹²⁰.
         assert!(end < 40.0 || outcome.is_err(), "{asked:.0e}: {said}");
         rows.push([format!("{asked:.0e}"), format!("{end} s"), said]);
     }
     Ok(Section::new("Where it is refused")
         .paragraph(
-            "Errors of a chaotic motion grow exponentially, those of roundings too: what cannot be had is refused, with the time up to which it can.",
+            "The errors of a chaotic motion grow exponentially, and rounding errors do too. An accuracy that cannot be met is refused; the error says up to which time it is met.",
         )
         .figure(chart.to_svg()?, "Growth of errors")
-        .table(["asked", "span", "answer"], rows))
+        .table(["accuracy", "span", "answer"], rows))
 }

@@ -1,11 +1,12 @@
-//! Estimated errors beside true ones.
+//! Estimated errors compared with true ones.
 
 use crate::Scene;
 use crate::truth::Truth;
 use tfe::charts::{Axis, Chart, ChartError, Scale, Section, Style};
 use tfe::prelude::*;
 
-/// Errors that count: below, roundings of the reference show; above, the motion is lost.
+/// The range of errors that are compared: below, rounding errors of the reference show; above, the run has nothing to
+/// do with the motion.
 const ERRORS: std::ops::Range<f64> = 1e-12..3e-2;
 
 /// One run.
@@ -20,7 +21,7 @@ impl Point {
     }
 }
 
-/// Runs with elements of every family and steps from long to short.
+/// Runs with elements of all families and step sizes from long to short.
 pub fn measure<M: Model<N>, const N: usize>(model: &M, truth: &Truth<N>) -> Vec<Point> {
     let elements = [
         Element::primal(3),
@@ -80,12 +81,14 @@ pub fn line(scene: &Scene) -> String {
     )
 }
 
-/// Table and chart.
+/// The table and the chart.
 pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
     let all = || scenes.iter().flat_map(|scene| &scene.estimates);
     let (good, count) = (all().filter(|point| point.is_good()).count(), all().count());
-    println!("\nestimated over true error between 0.5 and 2 on {good} of {count} points\n");
-    let mut chart = Chart::new("Estimated over true error at the end of the span")
+    println!(
+        "\nthe estimate is within a factor of two of the true error for {good} of {count} runs\n"
+    );
+    let mut chart = Chart::new("Estimated and true errors at the end of the span")
         .x(Axis::new("true error").scale(Scale::Logarithmic))
         .y(Axis::new("estimated error").scale(Scale::Logarithmic));
     for scene in scenes {
@@ -98,14 +101,14 @@ pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
         let line = [(first, factor * first), (last, factor * last)];
         chart = chart.series(name, Style::Reference, line);
     }
-    Ok(Section::new("How far off a run is")
+    Ok(Section::new("Estimated errors")
         .paragraph(format!(
-            "Each run beside one of an element with one node more. Errors at the end of the span, relative to the largest coordinate or momentum, between {first:.0e} and {last:.0e}, of eight \
+            "The estimate is the difference from a run with an element of one node more. Errors at the end of the span, relative to the largest coordinate or momentum, between {first:.0e} and {last:.0e}, of eight \
              elements of all families with 10 to 1280 steps. {good} of {count} estimates are within a factor of two.",
         ))
         .figure(chart.to_svg()?, "Estimates and true errors")
         .table(
-            ["scene", "runs", "within a factor of two", "least ratio", "largest ratio"],
+            ["scene", "runs", "within a factor of two", "smallest ratio", "largest ratio"],
             scenes.iter().map(row),
         ))
 }

@@ -1,4 +1,4 @@
-//! What `structure()` finds, and what it is worth: the same model with and without each finding.
+//! How much each property that `structure()` finds in a model is worth: the same model with and without it.
 
 use crate::scenes::Start;
 use crate::scenes::lattice::{LATTICE, lattice_start};
@@ -24,7 +24,7 @@ const SEPARABLE: u8 = 3;
 const QUADRATIC: u8 = 4;
 const FREE: u8 = 5;
 
-/// A model of which one thing is not known.
+/// A model of which one property is withheld from the runtime.
 struct Unaware<'m, M, const WHAT: u8>(&'m M);
 
 const fn without(what: u8, known: Facts) -> Facts {
@@ -96,7 +96,7 @@ impl<M: Model<N>, const N: usize, const WHAT: u8> Model<N> for Unaware<'_, M, WH
     }
 }
 
-/// Masses in a row between walls: linear.
+/// A row of masses and springs between walls; linear.
 #[dynamics(
     coordinates(q[20]),
     lagrangian = sum(i in 0..20, dot(q[i])^2/2) - k/2*(q[0]^2 + q[19]^2) - sum(i in 0..19, k/2*(q[i+1] - q[i])^2),
@@ -105,7 +105,8 @@ struct Row {
     k: f64,
 }
 
-/// Masses in a row with stiffening springs, and the same with inertia that couples two of them by next to nothing: its mass matrix is constant, but no diagonal.
+/// A row of masses with stiffening springs; and the same with a tiny coupling of the inertia of two masses, so that its
+/// mass matrix is constant but not diagonal.
 #[dynamics(
     coordinates(q[24]),
     lagrangian = sum(i in 0..24, dot(q[i])^2/2) - sum(i in 0..23, (q[i+1] - q[i])^2/2 + (q[i+1] - q[i])^4/4),
@@ -118,7 +119,7 @@ struct Diagonal;
 )]
 struct Coupled;
 
-/// A heavy top in Euler angles, with and without its cyclic ones.
+/// A heavy top in Euler angles, with cyclic coordinates and after their elimination.
 #[dynamics(
     coordinates(phi, theta, psi),
     lagrangian = a/2*(dot(theta)^2 + dot(phi)^2*sin(theta)^2) + c/2*(dot(psi) + dot(phi)*cos(theta))^2 - mgl*cos(theta),
@@ -130,7 +131,7 @@ struct Top {
     mgl: f64,
 }
 
-/// A pendulum whose parameters are fields, and one whose parameters are numbers.
+/// Coupled pendulums whose parameters are fields, and the same with numbers as parameters.
 #[dynamics(coordinates(x, y), lagrangian = m/2*l^2*(dot(x)^2 + dot(y)^2) + m*g*l*(cos(x) + cos(y)) - k/2*l^2*(x - y)^2)]
 #[allow(dead_code, reason = "its operations are counted, it does not run")]
 struct ByFields {
@@ -147,7 +148,7 @@ struct ByFields {
 )]
 struct ByNumbers;
 
-/// A number with and without a finding.
+/// A measured quantity with and without a property.
 struct Finding {
     found: &'static str,
     scene: &'static str,
@@ -171,7 +172,7 @@ impl Finding {
     }
 }
 
-/// Steps that are timed.
+/// Timed runs of a number of steps.
 #[derive(Clone, Copy)]
 struct Timed {
     element: Element,
@@ -179,7 +180,7 @@ struct Timed {
 }
 
 impl Timed {
-    /// Microseconds a step: the least of several goes.
+    /// The time per step in microseconds: the smallest of several measurements.
     fn of<M: Model<N>, const N: usize>(
         self,
         model: &M,
@@ -192,7 +193,7 @@ impl Timed {
         while begin.elapsed() < patience || least.is_infinite() {
             let stepper = Stepper::new(model, self.element, Control::default())?;
             let (mut stepper, mut state) = (stepper.ends_only(), start);
-            // The first steps make what the others use.
+            // The first steps compute what the later ones reuse.
             for k in 0..50 {
                 stepper.advance(f64::from(k) * self.step, self.step, &mut state, &[])?;
             }
@@ -206,7 +207,7 @@ impl Timed {
         Ok(1e6 * least)
     }
 
-    /// The same model with and without one of its facts.
+    /// Times of the same model with and without one of its properties.
     fn pair<M: Model<N>, const N: usize, const WHAT: u8>(
         self,
         model: &M,
@@ -230,7 +231,7 @@ fn total(operations: Operations) -> f64 {
     f64::from(additions + multiplications + divisions + sines + functions)
 }
 
-/// Nanoseconds for the velocity that belongs to a momentum.
+/// The time in nanoseconds to solve for the velocity that belongs to a momentum.
 fn velocity_of<M: Model<2>>(model: &M, state: &State<2>) -> f64 {
     const TIMES: u32 = 2000;
     let go = |_| {
@@ -249,7 +250,7 @@ fn velocity_of<M: Model<2>>(model: &M, state: &State<2>) -> f64 {
     (0..20).map(go).fold(f64::INFINITY, f64::min)
 }
 
-/// How many second derivatives are not zero at a state, and how many there are.
+/// The number of non-zero second derivatives at a state, and the number of all entries.
 fn filled<M: Model<N>, const N: usize>(model: &M, state: &State<N>) -> [f64; 2] {
     let (mut first, mut second) = (First::ZERO, Second::ZERO);
     model.second(0.0, &state.q, &state.p, &mut first, &mut second);
@@ -284,15 +285,15 @@ fn findings() -> Result<Vec<Finding>, Box<dyn Error>> {
     push(
         "linear",
         scene,
-        "a step is one product with a matrix",
+        "a step is one matrix–vector product",
         "µs/step",
         linear,
     );
     let autonomous = timed.pair::<_, 20, AUTONOMOUS>(&row, start)?;
     push(
-        "no time in it",
+        "autonomous",
         scene,
-        "the matrix serves all steps",
+        "one matrix for all steps",
         "µs/step",
         autonomous,
     );
@@ -333,7 +334,7 @@ fn findings() -> Result<Vec<Finding>, Box<dyn Error>> {
     push(
         "no forces",
         "Hénon–Heiles",
-        "no velocities at the points",
+        "no velocities at the quadrature points",
         "µs/step",
         free,
     );
@@ -347,7 +348,7 @@ fn findings() -> Result<Vec<Finding>, Box<dyn Error>> {
     push(
         "diagonal mass matrix",
         "24 masses, stiffening springs",
-        "n products instead of n²",
+        "n multiplications instead of n²",
         "µs/step",
         diagonal,
     );
@@ -360,7 +361,7 @@ fn findings() -> Result<Vec<Finding>, Box<dyn Error>> {
     push(
         "quadratic in v",
         "double pendulum",
-        "one linear system gives the velocity of a momentum",
+        "the velocity of a momentum from one linear system",
         "ns",
         quadratic,
     );
@@ -409,7 +410,7 @@ fn findings() -> Result<Vec<Finding>, Box<dyn Error>> {
     );
     let operations = [ByNumbers::structure(), ByFields::structure()].map(|one| total(one.first));
     push(
-        "parameters that are numbers",
+        "numbers as parameters",
         "two coupled pendulums",
         "folded into the constants of the gradient",
         "operations",
@@ -421,7 +422,14 @@ fn findings() -> Result<Vec<Finding>, Box<dyn Error>> {
 /// The table of all findings.
 pub fn section() -> Result<Section, Box<dyn Error>> {
     let findings = findings()?;
-    let head = ["found", "scene", "what follows", "with", "without", "ratio"];
+    let head = [
+        "property",
+        "scene",
+        "consequence",
+        "with",
+        "without",
+        "ratio",
+    ];
     println!(
         "\n{:27} {:29} {:>24} {:>24} {:>7}",
         head[0], head[1], head[3], head[4], head[5]
@@ -430,9 +438,9 @@ pub fn section() -> Result<Section, Box<dyn Error>> {
         let [found, scene, _, with, without, ratio] = finding.cells();
         println!("{found:27} {scene:29} {with:>24} {without:>24} {ratio:>7}");
     }
-    Ok(Section::new("What is found has consequences")
+    Ok(Section::new("What the properties of a model are worth")
         .paragraph(
-            "Each line is the same motion twice: as the macro found the model to be, and with that finding withheld from the runtime, or in a model that is without it (diagonal mass matrix, cyclic coordinates, numbers); for the stiff one, by the steps that a fixed point allows.",
+            "Each row compares the same motion with and without a property that the macro finds: it is withheld from the runtime, or (diagonal mass matrix, cyclic coordinates, numbers as parameters) an equivalent model does not have it. For the stiff model, “without” are the steps to which fixed-point iteration is limited.",
         )
         .table(head, findings.iter().map(Finding::cells)))
 }

@@ -1,13 +1,19 @@
-//! Enough and no more: how far off a run is, and the element and step that an accuracy needs, in eight scenes.
+//! “Enough and no more”: how large the error of a run is, and which element and step an accuracy needs, in eight
+//! scenes.
 //!
 //! ```sh
 //! cargo run --release --example enough             # tables, charts and a page in target/enough
 //! cargo run --release --example enough -- folder
 //! ```
 //!
-//! The scenes are those of `speed_accuracy`. First, estimated errors beside true ones for elements of every family and many steps; then, for accuracies from 1e-4 to
-//! 1e-11, what `Simulation::accuracy` picks, the true error, and its time beside that of the best element, step and tolerance that trial finds, all searching
-//! included; then a chaotic motion and how far it can be had; what each finding of `structure()` is worth; last, ladders of models: which of several is just good enough.
+//! The scenes are those of `speed_accuracy`. The page has five parts:
+//!
+//! * estimated errors compared with true ones, for elements of all families and many step sizes;
+//! * for accuracies from 1e-4 to 1e-11, what `Simulation::accuracy` chooses, the true error, and its time, including
+//!   all runs of the search, relative to that of the best element, step and tolerance found by trying all of them;
+//! * a chaotic motion, and how long it can be computed;
+//! * how much is gained by each property that `structure()` finds;
+//! * ladders of models: which of several simplified models is just accurate enough.
 
 mod chaos;
 mod estimates;
@@ -15,7 +21,7 @@ mod findings;
 mod ladders;
 mod picks;
 #[path = "../speed_accuracy/scenes/mod.rs"]
-#[allow(dead_code, reason = "the other example compares them with more")]
+#[allow(dead_code, reason = "the other example uses all of it")]
 mod scenes;
 mod truth;
 
@@ -36,7 +42,7 @@ use tfe::charts::Page;
 use tfe::prelude::*;
 use truth::Truth;
 
-/// A scene with all that is found out about it.
+/// A scene with all of its results.
 struct Scene {
     title: &'static str,
     estimates: Vec<estimates::Point>,

@@ -1,4 +1,4 @@
-//! What is picked for an accuracy, and what trial would have found.
+//! What is chosen for an accuracy, compared with the best choice found by trial.
 
 use crate::Scene;
 use crate::scenes::short;
@@ -10,10 +10,10 @@ use tfe::accuracy::Picked;
 use tfe::charts::{Axis, Chart, ChartError, Scale, Section, Style};
 use tfe::prelude::*;
 
-/// One accuracy.
+/// The results for one accuracy.
 pub struct Pick {
     asked: f64,
-    /// What came of it, or why nothing did.
+    /// The run that was chosen, or why there is none.
     outcome: Result<Run, String>,
 }
 
@@ -24,13 +24,13 @@ struct Run {
     step: f64,
     runs: usize,
     seconds: f64,
-    /// Of the run that was picked, without the search for it, where its steps are equal.
+    /// The time of the chosen run alone, without the search, if its steps are equal.
     alone: Option<f64>,
-    /// Of the best way that trial finds, where there is any.
+    /// The time of the fastest combination found by trial, if there is any.
     best: Option<f64>,
 }
 
-/// Asks for accuracies, and tries elements, steps and tolerances of the scene.
+/// Asks for each accuracy, and tries elements, steps and tolerances of the scene.
 pub fn measure<M: Model<N>, const N: usize>(
     model: &M,
     truth: &Truth<N>,
@@ -46,7 +46,7 @@ pub fn measure<M: Model<N>, const N: usize>(
         .tolerances((3..13).map(|digits| 10_f64.powi(-digits)))
         .repeat_for(Duration::from_millis(3))
         .run()?;
-    // Both ways are timed as they are used: by a simulation that keeps the end.
+    // Both are timed as they would be used: by a simulation that records the end only.
     let simulation = Simulation::new(model).record_every(usize::MAX);
     let span = 0.0..truth.end;
     let mut picks = Vec::new();
@@ -79,7 +79,8 @@ pub fn measure<M: Model<N>, const N: usize>(
                 seconds: least_seconds(|| accurate.run(truth.start, span.clone()).is_ok()),
                 best,
             });
-        // An estimate is never below half of the error. Where nothing is optimised the truth has few steps, and is not known as well.
+        // The estimate is at least half of the error. Without optimisation the reference has few steps and is less
+        // accurate.
         if let Ok(run) = &outcome
             && !cfg!(debug_assertions)
         {
@@ -94,7 +95,7 @@ pub fn measure<M: Model<N>, const N: usize>(
     Ok(picks)
 }
 
-/// The least of several goes.
+/// The smallest of several times.
 fn least_seconds(mut go: impl FnMut() -> bool) -> f64 {
     let begin = Instant::now();
     let mut least = f64::INFINITY;
@@ -159,7 +160,7 @@ impl Pick {
     pub fn line(&self, title: &str) -> String {
         let [title, asked, error, estimate, way, runs, time, ratio, alone] = self.row(title);
         format!(
-            "  {title:<26} {asked:>6}  true {error:>8}  estimated {estimate:>8}  {way:<26} {runs} runs {time:>8} µs  {ratio:>5} of the best, {alone:>5} without the search"
+            "  {title:<26} {asked:>6}  true {error:>8}  estimated {estimate:>8}  {way:<26} {runs} runs {time:>8} µs  {ratio:>5} × the best, {alone:>5} × without the search"
         )
     }
 }
@@ -168,21 +169,21 @@ fn told(ratio: Option<f64>) -> String {
     ratio.map_or_else(|| "—".to_owned(), |ratio| format!("{ratio:.2}"))
 }
 
-/// The middle one, and how many are at most two.
+/// The median, and how many numbers are at most two.
 fn middle(mut ratios: Vec<f64>) -> (f64, usize) {
     ratios.sort_by(f64::total_cmp);
     let median = ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN);
     (median, ratios.iter().filter(|ratio| **ratio <= 2.0).count())
 }
 
-/// Table and charts.
+/// The table and the charts.
 pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
-    let mut errors = Chart::new("The true error of what was asked for")
+    let mut errors = Chart::new("True errors by accuracy asked for")
         .x(Axis::new("accuracy asked for").scale(Scale::Logarithmic))
         .y(Axis::new("true error").scale(Scale::Logarithmic));
-    let mut times = Chart::new("Time beside the best element, step and tolerance by trial")
+    let mut times = Chart::new("Time relative to the best choice found by trial")
         .x(Axis::new("accuracy asked for").scale(Scale::Logarithmic))
-        .y(Axis::new("times the best").scale(Scale::Logarithmic));
+        .y(Axis::new("time / best time").scale(Scale::Logarithmic));
     let (mut ratios, mut alone) = (Vec::new(), Vec::new());
     let (mut count, mut met) = (0, 0);
     for scene in scenes {
@@ -206,27 +207,27 @@ pub fn section(scenes: &[Scene]) -> Result<Section, ChartError> {
     let (median, within) = middle(ratios);
     let (median_alone, within_alone) = middle(alone);
     let summary = format!(
-        "The accuracy is met in {met} of {count} cases. All runs of the search together take {median:.2} times (median) the time of the best way that trial finds, and at most twice in {within} of \
-         {all}; the run that is picked takes {median_alone:.2} times that time, and at most twice in {within_alone} of {all_alone}."
+        "The accuracy is met in {met} of {count} cases. All runs of the search together take {median:.2} times (median) the time of the best choice found by trial, and at most twice in {within} of \
+         {all}; the chosen run alone takes {median_alone:.2} times that time, and at most twice in {within_alone} of {all_alone}."
     );
     println!("\n{summary}\n");
     let rows = scenes
         .iter()
         .flat_map(|scene| scene.picks.iter().map(|pick| pick.row(scene.title)));
-    Ok(Section::new("What an accuracy needs")
+    Ok(Section::new("What is chosen for an accuracy")
         .paragraph(summary)
         .figure(errors.to_svg()?, "True errors")
         .figure(times.to_svg()?, "Times")
         .table(
             [
                 "scene",
-                "asked",
+                "accuracy",
                 "true error",
                 "estimated",
-                "picked",
+                "chosen",
                 "runs",
                 "µs",
-                "times the best",
+                "time / best time",
                 "without the search",
             ],
             rows,

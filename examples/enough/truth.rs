@@ -1,8 +1,8 @@
-//! What runs are compared with.
+//! The reference solution that runs are compared with.
 
 use tfe::prelude::*;
 
-/// A motion that is far more accurate than all others, by steps so short that only roundings are left.
+/// A motion far more accurate than all others: its steps are so short that only rounding errors are left.
 pub struct Truth<const N: usize> {
     pub start: State<N>,
     pub end: f64,
@@ -35,7 +35,8 @@ impl<const N: usize> Truth<N> {
         })
     }
 
-    /// The larger relative error of coordinates and momenta at the end; NaN if one is, which is the largest by `total_cmp`.
+    /// The relative error at the end, the larger one of coordinates and momenta. NaN if one of them is: `total_cmp`
+    /// treats it as the largest number.
     pub fn error(&self, end: &Node<N>) -> f64 {
         let largest = |a: &[f64; N], b: &[f64; N]| {
             let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());

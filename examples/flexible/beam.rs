@@ -1,12 +1,17 @@
-//! A planar beam at any rotation, clamped to a hub that turns: the geometrically exact beam (E. Reissner, On one-dimensional finite-strain beam theory, ZAMP 23 (1972)
-//! 795–804; J. C. Simo, L. Vu-Quoc, On the dynamics of flexible beams under large overall motions, J. Appl. Mech. 53 (1986) 849–863).
+//! A planar beam with arbitrarily large rotations, clamped to a rotating hub: the geometrically exact beam (E.
+//! Reissner, On one-dimensional finite-strain beam theory, ZAMP 23 (1972) 795–804; J. C. Simo, L. Vu-Quoc, On the
+//! dynamics of flexible beams under large overall motions, J. Appl. Mech. 53 (1986) 849–863).
 //!
-//! n straight elements of two nodes, strains taken in their middle (so that slender elements do not lock), masses lumped at the nodes. With Δ the difference
-//! of neighbours, φ the rotation in the middle between them and ℓ the length of an element:
+//! It is discretised by n straight elements of two nodes, with lumped masses. The strains are evaluated at the
+//! midpoints, so that slender elements do not lock. With Δ the difference of neighbouring nodes, φ the rotation at the
+//! midpoint and ℓ the length of an element:
 //!
 //! ```text
 //! Γ₁ = (cos φ Δx + sin φ Δy)/ℓ − 1 ,   Γ₂ = (cos φ Δy − sin φ Δx)/ℓ ,   κ = Δφ/ℓ ,   U = Σ ℓ/2 (EA Γ₁² + GA Γ₂² + EI κ²)
 //! ```
+//!
+//! Four studies: natural frequencies and static bending into a circle against closed forms, a fall with steps beyond
+//! the limit of explicit methods, and a rotating beam stretched by centrifugal forces.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::error::Error;
@@ -35,7 +40,7 @@ use tfe::prelude::*;
 )]
 #[derive(Clone, Debug)]
 struct Beam {
-    /// Elements.
+    /// Number of elements.
     n: usize,
     length: f64,
     ea: f64,
@@ -44,14 +49,14 @@ struct Beam {
     rho_a: f64,
     rho_i: f64,
     g: f64,
-    /// At the tip.
+    /// A moment at the tip.
     moment: f64,
-    /// The rate of the hub.
+    /// The angular velocity of the hub.
     spin: f64,
 }
 
 impl Beam {
-    /// As slender as a ruler: bending is all that is seen.
+    /// A slender beam, like a ruler, dominated by bending.
     fn slender(n: usize) -> Self {
         Self {
             n,
@@ -79,7 +84,7 @@ impl Beam {
         self.coordinates(|s| [s, 0.0, 0.0])
     }
 
-    /// L_q + Q, and −∂(L_q + Q)/∂q.
+    /// The static force L_q + Q, and the stiffness −∂(L_q + Q)/∂q.
     fn statics(&self, q: &[f64]) -> (Vec<f64>, DMatrix<f64>) {
         let size = self.len();
         let zero = vec![0.0; size];
@@ -102,7 +107,7 @@ impl Beam {
         (total.collect(), stiffness)
     }
 
-    /// The lumped masses.
+    /// The lumped masses and rotary inertias of all coordinates.
     fn masses(&self) -> Vec<f64> {
         let l = self.length / self.n as f64;
         let node = |i: usize| if i + 1 == self.n { 0.5 * l } else { l };
@@ -114,7 +119,7 @@ impl Beam {
     }
 }
 
-/// (βL)² of the first bending modes of a cantilever: cos βL cosh βL = −1.
+/// (βL)² of the first bending modes of a cantilever, from the roots of cos βL cosh βL = −1.
 fn cantilever(mode: usize) -> f64 {
     let rest = |x: f64| x.cos() + 1.0 / x.cosh();
     let (mut low, mut high) = (mode as f64 * PI, (mode + 1) as f64 * PI);
@@ -129,7 +134,7 @@ fn cantilever(mode: usize) -> f64 {
     low * low
 }
 
-/// A matrix with the roots of the lumped masses on either side.
+/// The matrix scaled by a diagonal one from the left and from the right, which keeps it symmetric.
 fn weighted(matrix: &DMatrix<f64>, root: impl Fn(usize) -> f64) -> DMatrix<f64> {
     let symmetric = |i, j| 0.5 * (matrix[(i, j)] + matrix[(j, i)]);
     DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
@@ -137,7 +142,8 @@ fn weighted(matrix: &DMatrix<f64>, root: impl Fn(usize) -> f64) -> DMatrix<f64> 
     })
 }
 
-/// The lowest frequencies of stiffness and lumped masses: of the flexibility, whose largest eigenvalues they are, so that rounding spares them.
+/// The lowest frequencies, from the largest eigenvalues of the flexibility (inverse of the stiffness), which rounding
+/// affects least.
 fn lowest(stiffness: &DMatrix<f64>, masses: &[f64], count: usize) -> Option<Vec<f64>> {
     let flexibility = stiffness.clone().try_inverse()?;
     let flexibility = weighted(&flexibility, |i| masses[i].sqrt());
@@ -148,29 +154,29 @@ fn lowest(stiffness: &DMatrix<f64>, masses: &[f64], count: usize) -> Option<Vec<
     Some(lowest.map(|value| 1.0 / value.sqrt()).collect())
 }
 
-/// The highest frequency.
+/// The highest frequency of these stiffness and mass matrices.
 fn highest(stiffness: &DMatrix<f64>, masses: &[f64]) -> f64 {
     let scaled = weighted(stiffness, |i| 1.0 / masses[i].sqrt());
     SymmetricEigen::new(scaled).eigenvalues.max().sqrt()
 }
 
-/// The stiffness of bending with the rotations condensed: they follow without inertia.
+/// The bending stiffness after static condensation of the rotations, whose inertia is neglected.
 fn condensed(stiffness: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     let block = |row: usize, column: usize| stiffness.view((row * n, column * n), (n, n));
     let inverse = block(2, 2).into_owned().cholesky()?;
     Some(block(1, 1) - block(1, 2) * inverse.solve(&block(2, 1).into_owned()))
 }
 
-/// Bending frequencies against those of the continuous beam.
+/// Bending frequencies compared with those of the continuous beam.
 pub(crate) fn frequencies() -> Result<Section, Box<dyn Error>> {
     const MODES: usize = 4;
     let mut rows = Vec::new();
     let mut errors = Vec::new();
     println!(
-        "bending frequencies of a cantilever, relative error by mode; with condensed rotations"
+        "bending frequencies of a cantilever, relative errors of modes 1 to 4; the same with condensed rotations"
     );
     for n in [8, 16, 32, 64] {
-        // So slender that shear and rotary inertia are not seen.
+        // So slender that shear and rotary inertia do not matter.
         let beam = Beam {
             ea: 1e8,
             ga: 4e7,
@@ -183,7 +189,7 @@ pub(crate) fn frequencies() -> Result<Section, Box<dyn Error>> {
             "a straight beam is at rest"
         );
         let masses = beam.masses();
-        // Bending and stretching do not know of each other here: y and φ alone.
+        // About the straight beam, bending and stretching are decoupled: only y and φ are needed.
         let bending = stiffness.view((n, n), (2 * n, 2 * n)).into_owned();
         let all = lowest(&bending, &masses[n..], MODES).ok_or("a stiff beam")?;
         let condensed = condensed(&stiffness, n).ok_or("rotations have a stiffness")?;
@@ -233,13 +239,14 @@ pub(crate) fn frequencies() -> Result<Section, Box<dyn Error>> {
         chart = chart.series(format!("mode {}", mode + 1), Style::LineWithMarkers, points);
     }
     Ok(Section::new("Frequencies of a cantilever")
-        .paragraph("Relative errors of the bending frequencies against cos βL cosh βL = −1 (ω = β² √(EI/ρA)): second order in the length of the elements. To the right the \
-                    same with the rotations condensed statically, a third of the unknowns.")
+        .paragraph("Relative errors of the bending frequencies against cos βL cosh βL = −1 (ω = β² √(EI/ρA)): second order in the length of the elements. The columns on the right are the \
+                    same after static condensation of the rotations, with a third of the unknowns.")
         .table(header, rows)
         .figure(chart.to_svg()?, "Errors of the first four frequencies over the number of elements"))
 }
 
-/// A moment 2π EI/L bends a beam to a full circle; found by Newton's method from the straight one, in steps of the load.
+/// An end moment of 2π EI/L bends the beam into a full circle. The solution is found by Newton's method from the
+/// straight beam, in load steps.
 pub(crate) fn circle() -> Result<Section, Box<dyn Error>> {
     const STEPS: usize = 20;
     let n = 32;
@@ -249,7 +256,7 @@ pub(crate) fn circle() -> Result<Section, Box<dyn Error>> {
     let mut shapes = vec![q.clone()];
     for step in 1..=STEPS {
         beam.moment = TAU * beam.ei / beam.length * step as f64 / STEPS as f64;
-        // A start as the last shape, turned on: curvature grows with the load.
+        // Each load step starts from the last shape.
         for _ in 0..50 {
             let (force, stiffness) = beam.statics(&q);
             let correction = stiffness
@@ -271,9 +278,9 @@ pub(crate) fn circle() -> Result<Section, Box<dyn Error>> {
     let tip = q[n - 1].hypot(q[2 * n - 1]);
     let turned = q[3 * n - 1] / TAU - 1.0;
     println!(
-        "full circle by a moment: tip {tip:.1e} from the clamp, rotation {turned:.1e} from 2π, {iterations} Newton iterations in {STEPS} load steps"
+        "full circle under an end moment: distance of the tip from the clamp {tip:.1e}, error of its rotation {turned:.1e}, {iterations} Newton iterations in {STEPS} load steps"
     );
-    // Rounding of EA = 10⁶ over EI = 1.
+    // The ratio EA/EI = 10⁶ amplifies rounding errors.
     assert!(tip < 1e-8 && turned.abs() < 1e-9, "{tip:e} {turned:e}");
     let mut chart = Chart::new("A beam under an end moment")
         .x("x")
@@ -288,12 +295,13 @@ pub(crate) fn circle() -> Result<Section, Box<dyn Error>> {
         chart = chart.line(name, std::iter::once((0.0, 0.0)).chain(nodes));
     }
     Ok(Section::new("A full circle")
-        .paragraph(format!("The moment 2π EI/L at the tip closes the beam: the tip ends {tip:.1e} from the clamp, in closed form at it. {iterations} iterations of \
+        .paragraph(format!("Under the moment 2π EI/L at its tip the beam becomes a closed circle: the distance of the tip from the clamp, zero in closed form, is {tip:.1e}. {iterations} iterations of \
                             Newton's method with the derived second derivatives."))
         .figure(chart.to_svg()?, "Shapes under growing moments"))
 }
 
-/// A cantilever let go in gravity: steps far beyond the explicit limit 2/ω of the fastest mode.
+/// A cantilever released under gravity, with steps far beyond the limit 2/ω of explicit methods, where ω is the highest
+/// frequency.
 pub(crate) fn steps() -> Result<Section, Box<dyn Error>> {
     let n = 24;
     let beam = Beam {
@@ -314,12 +322,12 @@ pub(crate) fn steps() -> Result<Section, Box<dyn Error>> {
     let tip = |motion: &tfe::family::Motion| [motion.last().q[n - 1], motion.last().q[2 * n - 1]];
     let exact = tip(&reference);
     println!(
-        "falling cantilever: the explicit limit is h = {limit:.1e}; tip ends at ({:.4}, {:.4})",
+        "falling cantilever: the limit of explicit steps is h = {limit:.1e}; final position of the tip ({:.4}, {:.4})",
         exact[0], exact[1]
     );
     let mut rows = Vec::new();
     let mut solved = 0;
-    // What gravity can give; the energy at the start is zero.
+    // The work that gravity can do, as the scale of the energy error; the energy at the start is zero.
     let scale = 0.5 * beam.rho_a * beam.g * beam.length * beam.length;
     for factor in [100.0, 200.0, 400.0, 800.0, 1600.0] {
         let (motion, seconds) = match run(Element::mixed(4), factor * limit) {
@@ -343,7 +351,7 @@ pub(crate) fn steps() -> Result<Section, Box<dyn Error>> {
         let statistics = motion.statistics();
         let by_step = statistics.iterations as f64 / statistics.steps as f64;
         println!(
-            "  h = {factor:>4} × the limit: tip error {error:.1e}, energy error {energy:.1e}, {} steps, {by_step:.1} iterations a step, {seconds:.2} s",
+            "  h = {factor:>4} × the limit: tip error {error:.1e}, energy error {energy:.1e}, {} steps, {by_step:.1} iterations per step, {seconds:.2} s",
             statistics.steps
         );
         assert!(error < 1e-5, "{error:e}");
@@ -357,7 +365,9 @@ pub(crate) fn steps() -> Result<Section, Box<dyn Error>> {
         ]);
     }
     assert!(solved > 0, "no step beyond the explicit limit is solved");
-    let mut chart = Chart::new("A cantilever let go in gravity").x("x").y("y");
+    let mut chart = Chart::new("A cantilever released under gravity")
+        .x("x")
+        .y("y");
     let nodes = reference.states();
     for k in 0..=6 {
         let node = &nodes[(nodes.len() - 1) * k / 6];
@@ -369,20 +379,21 @@ pub(crate) fn steps() -> Result<Section, Box<dyn Error>> {
         chart = chart.line(name, std::iter::once((0.0, 0.0)).chain(points));
     }
     let header = [
-        "step over the explicit limit",
+        "step / explicit limit",
         "error of the tip",
         "energy error",
         "steps",
-        "iterations a step",
+        "iterations per step",
     ];
     Ok(Section::new("Implicit steps")
-        .paragraph(format!("The fastest mode, of rotation against shear, limits explicit steps to h = {limit:.1e}. Mixed::<4> with a sparse Newton method; errors of the tip at \
+        .paragraph(format!("The fastest mode, a rotation of the cross-sections against the shear stiffness, limits explicit steps to h = {limit:.1e}. Mixed::<4> with a sparse Newton method; errors of the tip at \
                             t = 0.6 against Mixed::<6> with 200 times the limit."))
         .table(header, rows)
         .figure(chart.to_svg()?, "Shapes while it falls"))
 }
 
-/// A beam whirling with its hub: in the continuous limit points are at r(s) = sin ks/(k cos kL), k = Ω √(ρA/EA).
+/// A beam rotating with its hub and stretched by centrifugal forces. In the continuous limit its points are at r(s) =
+/// sin ks/(k cos kL), k = Ω √(ρA/EA).
 pub(crate) fn whirl() -> Result<Section, Box<dyn Error>> {
     const TURNS: f64 = 3.0;
     let mut rows = Vec::new();
@@ -415,15 +426,15 @@ pub(crate) fn whirl() -> Result<Section, Box<dyn Error>> {
         });
         let error = off.max_by(f64::total_cmp).unwrap_or(f64::NAN);
         println!(
-            "whirling beam, {n:>2} elements: stretched from 1 to {exact:.4}, farthest from the closed form {error:.1e} in {TURNS} turns"
+            "rotating beam, {n:>2} elements: stretched from 1 to {exact:.4}, largest deviation from the closed form {error:.1e} in {TURNS} turns"
         );
         rows.push([n.to_string(), format!("{error:.1e}")]);
         errors.push(error);
     }
     let order = (errors[2] / errors[3]).log2();
     assert!((order - 2.0).abs() < 0.3, "order {order}");
-    Ok(Section::new("Whirling")
-        .paragraph("A hub that turns at Ω = 10 stretches the beam by its own inertia; the tip is at tan(kL)/k with k = Ω √(ρA/EA), here 1.0926 of its length. Farthest \
-                    distance of the tip from there over three turns of large rotation, by the number of elements.")
+    Ok(Section::new("Rotating beam")
+        .paragraph("A hub that rotates at Ω = 10 stretches the beam by centrifugal forces; in closed form the tip is at tan(kL)/k with k = Ω √(ρA/EA), here 1.0926 of its length. The table shows the largest \
+                    distance of the tip from that radius over three turns, by the number of elements.")
         .table(["elements", "distance"], rows))
 }

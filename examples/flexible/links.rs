@@ -1,5 +1,6 @@
-//! A hanging chain of n point masses on massless rods, twice: by angles, whose mass matrix is dense, and by Cartesian coordinates with rods as constraints,
-//! whose equations are sparse.
+//! A hanging chain of n point masses on massless rods, described in two ways: by angles, with a dense mass matrix, and
+//! by Cartesian coordinates with the rods as constraints, with sparse equations. The table shows the time per step of
+//! both over the length of the chain.
 
 use std::error::Error;
 use std::time::Instant;
@@ -7,7 +8,7 @@ use tfe::charts::{Axis, Chart, Scale, Section, Style};
 use tfe::family::{self, FamilyState};
 use tfe::prelude::*;
 
-/// Angles from the downward vertical; masses and lengths one.
+/// Angles from the downward vertical; unit masses and lengths.
 #[dynamics(
     coordinates(theta[n]),
     lagrangian = sum(i in 0..n, (n - i)/2*dot(theta[i])^2 + g*(n - i)*cos(theta[i]))
@@ -52,7 +53,7 @@ fn rods(n: usize) -> (Rods, FamilyState) {
     (model, start)
 }
 
-/// Where the masses are.
+/// The positions of the masses.
 fn cartesian(theta: &[f64]) -> Vec<f64> {
     let sums = |of: fn(f64) -> f64| {
         theta.iter().scan(0.0, move |sum, angle| {
@@ -63,11 +64,12 @@ fn cartesian(theta: &[f64]) -> Vec<f64> {
     sums(f64::sin).chain(sums(|angle| -angle.cos())).collect()
 }
 
-/// Milliseconds a step of Mixed::<3>: the least of a few runs.
+/// Milliseconds per step of Mixed::<3>; the smallest of a few runs.
 fn milliseconds<M: family::Model>(model: &M, start: &FamilyState) -> Result<f64, Box<dyn Error>> {
     let simulation = Simulation::new(model).element(Mixed::<3>).step(STEP);
     let simulation = simulation.record_every(usize::MAX);
-    // The ordering of the equations is done once a run: the difference of two lengths is what steps take.
+    // The equations are ordered once in each run; the difference of the times of two runs of different lengths is that
+    // of the steps alone.
     const STEPS: [u32; 2] = if cfg!(debug_assertions) {
         [1, 2]
     } else {
@@ -88,7 +90,7 @@ fn milliseconds<M: family::Model>(model: &M, start: &FamilyState) -> Result<f64,
     Ok(1e3 * (least[1] - least[0]) / f64::from(STEPS[1] - STEPS[0]))
 }
 
-/// The slope of log(time) over log(n) between the last two lengths.
+/// The exponent: the slope of log(time) over log(n) between the last two lengths.
 fn exponent(times: &[f64]) -> f64 {
     let last = times.len() - 1;
     (times[last] / times[last - 1]).log2()
@@ -97,7 +99,7 @@ fn exponent(times: &[f64]) -> f64 {
 pub(crate) fn cost() -> Result<Section, Box<dyn Error>> {
     let difference = same_motion()?;
     println!(
-        "chain of links, milliseconds a step\n  {:>4} {:>12} {:>12}",
+        "chain of links, milliseconds per step\n  {:>4} {:>12} {:>12}",
         "n", "angles", "rods"
     );
     let (mut dense, mut sparse) = (Vec::new(), Vec::new());
@@ -143,14 +145,14 @@ pub(crate) fn cost() -> Result<Section, Box<dyn Error>> {
         .map(|(n, (dense, sparse))| [n.to_string(), format!("{dense:.3}"), format!("{sparse:.3}")]);
     Ok(Section::new("A chain of links")
         .paragraph(format!(
-            "Angles need no constraints, but every link moves every other: a dense matrix. Rods know their neighbours alone. From 256 to 512 links the time of a step grows \
-             like n^{steep:.2} by angles and n^{flat:.2} by rods; both take the same at {crossing}. Eight links move alike to {difference:.1e}."
+            "Angles need no constraints, but all links are coupled, which gives a dense matrix. A rod as a constraint is coupled with its neighbours only. From 256 to 512 links the time of a step grows \
+             as n^{steep:.2} with angles and as n^{flat:.2} with rods; both take the same time at {crossing}. The motions of eight links differ by {difference:.1e}."
         ))
-        .table(["links", "angles, ms a step", "rods, ms a step"], rows)
+        .table(["links", "angles, ms per step", "rods, ms per step"], rows)
         .figure(chart.to_svg()?, "Time per step of both descriptions"))
 }
 
-/// Eight links by both descriptions: the farthest distance of their masses at the end of two units of time.
+/// The largest distance between the masses of eight links by both descriptions, after two units of time.
 fn same_motion() -> Result<f64, Box<dyn Error>> {
     let (model, start) = angles(8);
     let one = Simulation::new(&model).element(Mixed::<6>).step(STEP);
@@ -165,7 +167,7 @@ fn same_motion() -> Result<f64, Box<dyn Error>> {
         .map(|(one, other)| (one - other).abs());
     let apart = apart.max_by(f64::total_cmp).unwrap_or(f64::NAN);
     println!(
-        "eight links for two units of time: angles and rods apart by {apart:.1e}, energy errors {:.1e} and {:.1e}",
+        "eight links for two units of time: difference between angles and rods {apart:.1e}, energy errors {:.1e} and {:.1e}",
         one.energy_error(),
         other.energy_error()
     );

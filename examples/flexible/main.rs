@@ -1,4 +1,5 @@
-//! Flexible bodies of any number of parts: a geometrically exact beam, and a chain of links by angles and by rods. One page of HTML.
+//! Flexible bodies with any number of parts: a geometrically exact beam, and a hanging chain described by angles and by
+//! rods as constraints. Tables are printed; the path of a page of HTML with charts is printed last.
 //!
 //! ```text
 //! cargo run --release --features sparse --example flexible

@@ -1,12 +1,14 @@
-//! Speed and accuracy: which element reaches an error in the least time, in eight scenes.
+//! Speed and accuracy: which element reaches a given error in the least time, in eight scenes.
 //!
 //! ```sh
 //! cargo run --release --example speed_accuracy             # pictures, tables and a page in target/speed_accuracy
 //! cargo run --release --example speed_accuracy -- folder
 //! ```
 //!
-//! Every family with 2 to 5, 7, 9 and 12 nodes runs each scene with several steps; errors are those at the end, against values that are known to
-//! more digits where there are any, else against a finer run that is checked against another. Each module holds the scenes of one kind.
+//! All families with 2 to 5, 7, 9 and 12 nodes run each scene with many step sizes. Errors are those at the end of the
+//! run, compared with values that are known to more digits, or where there are none with a finer run, which is checked
+//! against another one. The table shows for each scene and error the element, step size and tolerance that reach it in
+//! the least time, and the energy error of that run. Each module holds the scenes of one kind.
 
 mod overview;
 mod runs;
@@ -28,7 +30,7 @@ use tfe::work_precision::WorkPrecisionError;
 
 type Run = fn() -> Result<Scene, WorkPrecisionError>;
 
-/// One after the other, because they measure time.
+/// One after the other, since they measure times.
 const SCENES: [(&str, Run); 8] = [
     ("pendulum", || Scene::measure("Pendulum", pendulum())),
     ("kepler", || Scene::measure("Kepler, e = 0.6", kepler())),
@@ -76,9 +78,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::write(folder.join("overview.svg"), &overview)?;
     let summary = Section::new("The fastest elements")
         .paragraph(
-            "The least time in which any element with any of the steps reaches an error at the end of the run, relative to the \
-             largest state, the larger one of coordinates and momenta; the time is of the steps alone, on one processor. “—” where \
-             none does, or where the reference is not known that well.",
+            "The least time in which any element with any step size and tolerance reaches an error at the end of the run, relative to the \
+             largest state, the larger one of coordinates and momenta; the time is that of the steps alone, on one processor. “—” means that \
+             none does, or that the reference is not known well enough.",
         )
         .figure(overview, "All scenes")
         .table(HEADER, rows);

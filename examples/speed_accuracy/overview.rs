@@ -1,4 +1,4 @@
-//! All scenes in one picture: a panel for each, with the fastest runs of every family.
+//! All scenes in one picture: a panel for each, with the fastest runs of each family.
 
 use crate::runs::Scene;
 use std::fmt::Write;
@@ -7,18 +7,18 @@ use tfe::prelude::Element;
 use tfe::work_precision::Point;
 
 const COLUMNS: usize = 4;
-/// Of a panel with its labels, and of the frame inside, in pixels.
+/// The size of a panel with its labels, and of the frame inside, in pixels.
 const PANEL: (f64, f64) = (290.0, 262.0);
 const FRAME: (f64, f64) = (222.0, 190.0);
-/// Left of and above a frame.
+/// The space to the left of a frame and above it.
 const MARGIN: (f64, f64) = (52.0, 30.0);
-/// Powers of ten of the errors shown.
+/// The errors shown, as powers of ten.
 const ERRORS: (f64, f64) = (-12.0, -1.0);
 const GREY: &str = "#8a8a8a";
 const INK: &str = "#222222";
 
-/// A family: its name, how it makes an element of so many nodes, the width of its line, and its colour. Families that are equally fast
-/// lie on each other: the later ones are thinner.
+/// A family: its name, a function that makes an element with a number of nodes, the width of its line, and its colour.
+/// The curves of families that are equally fast coincide; the later ones are thinner, so that both are visible.
 type Family = (&'static str, fn(usize) -> Element, f64, usize);
 
 const FAMILIES: [Family; 7] = [
@@ -38,7 +38,7 @@ fn place(seconds: f64, error: f64) -> (f64, f64) {
     ((1e3 * seconds).log10(), error.max(1e-16).log10())
 }
 
-/// The least time for an error with each family, then with any other integrator.
+/// The least time for each error with each family, and then with any other integrator.
 fn curves(scene: &Scene) -> (Vec<Curve>, Curve) {
     let known = |point: &&Point| Some(place(point.measured()?.seconds, point.error()?));
     let families = FAMILIES.map(|(_, element, ..)| {
@@ -75,7 +75,7 @@ pub fn overview(scenes: &[Scene]) -> String {
     svg + "</svg>\n"
 }
 
-/// A frame with its axes and curves. Writing into a string cannot fail.
+/// Draws a frame with its axes and curves. Writing into a string cannot fail.
 fn panel(
     svg: &mut String,
     title: &str,
@@ -159,7 +159,8 @@ fn panel(
     }
 }
 
-/// Multiples of powers of ten between two logarithms: as many as there is room for, and two at least.
+/// Multiples of powers of ten between two logarithms, for the labels of an axis: as many as there is room for, and at
+/// least two.
 fn marks(first: f64, last: f64) -> Vec<(i32, i32)> {
     let of = |multiples: &[i32]| -> Vec<(i32, i32)> {
         (first.floor() as i32..=last.floor() as i32)
@@ -172,7 +173,7 @@ fn marks(first: f64, last: f64) -> Vec<(i32, i32)> {
     }
     match of(&[1]) {
         powers if powers.len() >= 2 => powers,
-        // Half a decade apart, where 2 and 5 would run into each other.
+        // Half a decade apart: labels at 2 and 5 would overlap.
         _ => of(&[1, 3]),
     }
 }
@@ -202,7 +203,7 @@ fn legend(svg: &mut String, top: f64, with_peers: bool) {
             x + 32.0,
             top + 4.0
         );
-        // About the width of a letter of this size.
+        // The approximate width of a letter of this size.
         x += 56.0 + 6.6 * name.chars().count() as f64;
     }
     let _ = writeln!(
@@ -214,7 +215,7 @@ fn legend(svg: &mut String, top: f64, with_peers: bool) {
     );
 }
 
-/// 10 to a power, as text.
+/// A power of ten, as text.
 fn ten_to(power: i32) -> String {
     let raised = |digit: char| match digit {
         '-' => '⁻',
@@ -228,7 +229,7 @@ fn ten_to(power: i32) -> String {
     format!("10{text}")
 }
 
-/// A multiple of a power of ten of milliseconds.
+/// A multiple of a power of ten of milliseconds, as text.
 fn milliseconds(multiple: i32, power: i32) -> String {
     let of = |power| f64::from(multiple) * 10_f64.powi(power);
     match power {

@@ -15,7 +15,7 @@ const NODES: &[usize] = if cfg!(debug_assertions) {
     &[2, 3, 4, 5, 7, 9, 12]
 };
 
-/// A scene that was measured.
+/// A scene with its measurements.
 pub struct Scene {
     pub title: &'static str,
     pub measured: Measurements,
@@ -27,7 +27,7 @@ impl Scene {
         title: &'static str,
         problem: WorkPrecision<'_, M, S>,
     ) -> Result<Self, WorkPrecisionError> {
-        // Times of a program that was not optimised say little.
+        // Without optimisation, times are not meaningful: one short run is enough.
         let (every, time) = if cfg!(debug_assertions) {
             (4, 0)
         } else {
@@ -42,7 +42,7 @@ impl Scene {
         Ok(Self { title, measured })
     }
 
-    /// Writes all figures and the charts into the folder; the sections of the page hold the same charts.
+    /// Writes all results as CSV and the charts into the folder, and returns sections of the page with the same charts.
     pub fn save(&self, folder: &Path, name: &str) -> Result<Vec<Section>, Box<dyn Error>> {
         let of = |what: &str| format!("{}: {what}", self.title);
         let mixed = |curve: &Curve| curve.element() == Element::mixed(curve.element().nodes());
@@ -62,7 +62,10 @@ impl Scene {
                 .only(|curve| fastest.contains(&Some(curve.element())));
             charts.insert(
                 0,
-                ("peers", beside.title(of("our fastest beside other crates"))),
+                (
+                    "peers",
+                    beside.title(of("tfe's fastest elements and other crates")),
+                ),
             );
         }
         self.measured.save(folder.join(format!("{name}.csv")))?;
@@ -75,7 +78,7 @@ impl Scene {
     }
 }
 
-/// Every family with every number of nodes.
+/// All families with all numbers of nodes.
 fn elements() -> Vec<Element> {
     let of = |nodes| {
         [

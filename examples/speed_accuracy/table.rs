@@ -1,4 +1,4 @@
-//! The fastest elements.
+//! The table of the fastest elements.
 
 use crate::runs::{Scene, TARGETS};
 use crate::scenes::short;
@@ -14,7 +14,7 @@ pub const HEADER: [&str; 7] = [
     "energy",
 ];
 
-/// The fastest run for every target.
+/// The fastest run for each error to be reached.
 pub fn rows(scene: &Scene) -> [[String; 7]; 4] {
     TARGETS.map(|target| {
         let title = scene.title.to_owned();

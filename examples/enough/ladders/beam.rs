@@ -1,12 +1,13 @@
-//! A beam by its lowest modes.
+//! A beam reduced to its lowest modes.
 
 use super::{ladder, served, shown};
 use std::error::Error;
 use tfe::charts::Section;
 use tfe::prelude::*;
 
-/// A slender beam of unit length, mass and stiffness, clamped at one end, in n parts of length 1/n: w[i] at x = (i + 1)/n. Central differences for its
-/// curvature, of which half a part lies at the clamp, where the slope is zero, and none at the free end, which has half the mass of the others.
+/// A slender beam of unit length, mass and stiffness, clamped at one end, in n parts of length 1/n: w[i] at x = (i +
+/// 1)/n. Its curvature is taken by central differences. At the clamp, where the slope is zero, it counts for half a
+/// part; at the free end, where the mass is half of the others, it is zero.
 ///
 /// ```text
 /// V = k/2 (½ (2 w₁)² + Σ (w_{i+1} − 2 w_i + w_{i−1})²) ,     k = n³ ,     m = 1/n
@@ -36,7 +37,7 @@ impl Beam {
     }
 }
 
-/// Drawn aside at its tip, and let go.
+/// The initial state: the shape under a force at the tip, released at rest.
 pub fn section() -> Result<Section, Box<dyn Error>> {
     const PARTS: usize = 40;
     let beam = Beam::new(PARTS);
@@ -44,7 +45,8 @@ pub fn section() -> Result<Section, Box<dyn Error>> {
     let two: Modal<'_, Beam, 2> = Modal::of(&beam)?;
     let five: Modal<'_, Beam, 5> = Modal::of(&beam)?;
     let twenty: Modal<'_, Beam, 20> = Modal::of(&beam)?;
-    // cos βL cosh βL = −1, in differences of second order.
+    // The first root of cos βL cosh βL = −1, squared; the error of the differences is of second order in the length of
+    // a part.
     let exact = 3.516_015_268_5;
     let lowest = one.frequencies()[0];
     println!(
@@ -55,7 +57,7 @@ pub fn section() -> Result<Section, Box<dyn Error>> {
     let drawn: Vec<f64> = x.map(|x| 0.005 * (3.0 * x * x - x.powi(3))).collect();
     let start = beam.state(drawn, vec![0.0; PARTS]);
     let end = if cfg!(debug_assertions) { 0.2 } else { 4.0 };
-    let ladder = ladder("A beam plucked at its tip, by modes", end)
+    let ladder = ladder("A beam released from a tip load, by modes", end)
         .rung("1 mode", &one, one.reduce(&start))
         .rung("2 modes", &two, two.reduce(&start))
         .rung("5 modes", &five, five.reduce(&start))
@@ -63,7 +65,7 @@ pub fn section() -> Result<Section, Box<dyn Error>> {
         .rung("full", &beam, start)
         .run()?;
     let seen = format!(
-        "Seen: the fewer modes, the longer the steps that serve them; the cheapest is {}.",
+        "Result: the fewer modes, the longer the steps may be; the cheapest model is {}.",
         served(&ladder)
     );
     shown(&ladder, &seen)

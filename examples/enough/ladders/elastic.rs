@@ -1,4 +1,4 @@
-//! A pendulum on a spring: from which stiffness on it is a rod.
+//! A pendulum on a spring: from which stiffness on the spring can be replaced by a rod.
 
 use super::{elements, fastest, ladder, micros, model_error, print_table, served, shown};
 use std::error::Error;
@@ -7,7 +7,8 @@ use tfe::charts::{Axis, Chart, Scale, Section, Style};
 use tfe::fidelity::Ladder;
 use tfe::prelude::*;
 
-/// A mass on a spring, from above; on a rod of its length, and on one as long as the spring is with the mass hanging at rest.
+/// A mass on a spring; on a rod as long as the unstretched spring; and on a rod as long as the spring is with the mass
+/// hanging at rest.
 #[dynamics(
     coordinates(r, theta),
     lagrangian = m/2*(dot(r)^2 + r^2*dot(theta)^2) + m*g*r*cos(theta) - k/2*(r - l)^2,
@@ -22,7 +23,7 @@ struct Spring {
     k: f64,
 }
 
-/// A ladder for each stiffness, and the errors of rods over all.
+/// A ladder for each stiffness, and the errors of the rods over all of them.
 pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
     let all = [(1e2, "10²"), (1e4, "10⁴"), (1e6, "10⁶"), (1e8, "10⁸")];
     let few = if cfg!(debug_assertions) { 2 } else { all.len() };
@@ -34,7 +35,7 @@ pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
     for (_, ladder) in &ladders {
         let [rod, long] = [0, 1].map(|rung: usize| model_error(&ladder.rungs()[rung]));
         let seen = format!(
-            "Seen: the rod errs by {rod}, the lengthened one by {long}; the cheapest is {}.",
+            "Result: the rod has an error of {rod}, the lengthened one of {long}; the cheapest model is {}.",
             served(ladder)
         );
         sections.push(shown(ladder, &seen)?);
@@ -43,7 +44,8 @@ pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
     Ok(sections)
 }
 
-/// Let go at 0.5 with the spring as long as it then is at rest, so that its fast oscillation is small, of the order of 1/k².
+/// Released at an angle of 0.5 with the length that the spring has there in equilibrium, so that its fast oscillation
+/// is small, of the order of 1/k².
 fn swing(k: f64, name: &str) -> Result<Ladder, Box<dyn Error>> {
     const ANGLE: f64 = 0.5;
     const END: f64 = 6.0;
@@ -66,8 +68,9 @@ fn swing(k: f64, name: &str) -> Result<Ladder, Box<dyn Error>> {
         .run()?)
 }
 
-/// Steps begin with a period of the spring where there are at most a hundred, so that the reference does not stop at steps that miss its oscillation. Of stiffer
-/// springs it does, where the oscillation is the only difference left between two runs: smaller errors are then not known.
+/// The first step size tried resolves the oscillation of the spring, if the span has at most a hundred of its periods;
+/// otherwise the reference might stop at steps that miss it. For stiffer springs it does: the oscillation is then the
+/// only difference between two runs, and errors smaller than it are not known.
 fn parts(periods: f64) -> usize {
     if periods <= 100.0 {
         (periods.ceil() as usize).max(16)
@@ -76,9 +79,9 @@ fn parts(periods: f64) -> usize {
     }
 }
 
-/// A line for each stiffness: errors of rods, and times beside those of the spring.
+/// A row for each stiffness: the errors of the rods, and their times compared with those of the spring.
 fn summary(ladders: &[(f64, Ladder)]) -> Result<Section, Box<dyn Error>> {
-    let title = "From which stiffness on a spring is a rod";
+    let title = "From which stiffness on can a rod replace a spring?";
     let error = |rung: usize| {
         let points = ladders.iter().filter_map(move |(k, ladder)| {
             let error = ladder.rungs()[rung].model_error()?;
@@ -96,7 +99,7 @@ fn summary(ladders: &[(f64, Ladder)]) -> Result<Section, Box<dyn Error>> {
         let slope = |(k, _): &(f64, f64)| (*k, last.0 * last.1 / k);
         chart = chart.series("1/k", Style::Reference, [slope(first), slope(last)]);
     }
-    // From the second on phases are off by little.
+    // The first stiffness is left out: only from the second on are the phase errors small.
     let exponents = [&rod, &long].map(|errors| exponent(errors.get(1..)?));
     assert!(ladders.len() < 3 || exponents[0].is_some(), "{rod:?}");
     for exponent in exponents.into_iter().flatten() {
@@ -105,9 +108,9 @@ fn summary(ladders: &[(f64, Ladder)]) -> Result<Section, Box<dyn Error>> {
     let scaled = |errors: &[(f64, f64)]| errors.last().map_or(f64::NAN, |(k, error)| k * error);
     let (by_rod, by_long) = (scaled(&rod), scaled(&long));
     let seen = format!(
-        "Seen: errors of rods go with 1/k, so for each accuracy ε there is a stiffness from which on the rod serves, {by_rod:.0}/ε, and {by_long:.0}/ε for the rod lengthened by \
-         the weight, which leaves what the tension changes during the swing. The spring's own oscillation, of amplitude 3 (m g sin θ/k)²/l at this start (7e-11 for k = 10⁶), \
-         is missed by long steps: what is as small is not known there, and for k = 10⁸ it is below all accuracies asked for."
+        "Result: the errors of the rods are proportional to 1/k. A rod is therefore accurate to ε from the stiffness {by_rod:.0}/ε on, and from {by_long:.0}/ε on if it is lengthened by \
+         the weight, which leaves the change of the tension during the swing. The spring's own oscillation, of amplitude 3 (m g sin θ/k)²/l at this start (7e-11 for k = 10⁶), \
+         is missed by long steps: errors smaller than it are not known there. For k = 10⁸ it is below all accuracies asked for."
     );
     let rows: Vec<_> = ladders.iter().map(|(k, ladder)| row(*k, ladder)).collect();
     println!("\n{title}");
@@ -119,7 +122,7 @@ fn summary(ladders: &[(f64, Ladder)]) -> Result<Section, Box<dyn Error>> {
         .table(HEADINGS, rows))
 }
 
-/// d log error / d log k between the ends.
+/// The slope d log error / d log k between the first and the last point.
 fn exponent(errors: &[(f64, f64)]) -> Option<f64> {
     let ((k0, e0), (k1, e1)) = (errors.first()?, errors.last()?);
     (k0 < k1).then(|| (e1 / e0).ln() / (k1 / k0).ln())
@@ -128,11 +131,11 @@ fn exponent(errors: &[(f64, f64)]) -> Option<f64> {
 const HEADINGS: [&str; 7] = [
     "k",
     "error of the rod",
-    "times k",
-    "of the longer rod",
-    "times k",
-    "µs of the longer rod",
-    "µs of the spring for the same",
+    "error × k",
+    "error of the longer rod",
+    "error × k",
+    "µs for the longer rod",
+    "µs for the spring, same error",
 ];
 
 fn row(k: f64, ladder: &Ladder) -> [String; 7] {
@@ -141,7 +144,7 @@ fn row(k: f64, ladder: &Ladder) -> [String; 7] {
     let scaled = |error: Option<f64>| {
         error.map_or_else(|| "—".to_owned(), |error| format!("{:.1}", k * error))
     };
-    // Twice the error of the model is what steps may double it to.
+    // The time for a total error of twice the error of the model.
     let [by_rod, by_spring] = [1, 2].map(|rung: usize| {
         let enough = long.map(|error| 2.0 * error);
         micros(enough.and_then(|enough| fastest(&rungs[rung], enough)))

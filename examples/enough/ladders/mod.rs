@@ -1,4 +1,5 @@
-//! Which model is just good enough: pendulums by amplitude, a top by its nutation, a pendulum on a spring by its stiffness, a beam by modes.
+//! Which model is just accurate enough: pendulums by amplitude, a top by its nutation, a pendulum on a spring by its
+//! stiffness, a beam by its number of modes.
 
 mod beam;
 mod elastic;
@@ -12,7 +13,7 @@ use tfe::fidelity::{Choice, Ladder, Rung};
 use tfe::prelude::*;
 use tfe::work_precision::Cost;
 
-/// One section a ladder, each with its chart and its table of choices, and what is seen.
+/// A section for each ladder, with its chart, its table of choices, and a sentence on the result.
 pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
     let mut sections = pendulum::sections()?;
     sections.extend(top::sections()?);
@@ -21,7 +22,7 @@ pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
     Ok(sections)
 }
 
-/// A ladder whose runs are repeated for a short time only.
+/// A ladder whose runs are timed for a short time only.
 fn ladder<'m>(title: impl Into<String>, end: f64) -> Fidelity<'m> {
     let repeat_for = if cfg!(debug_assertions) { 0 } else { 5 };
     Fidelity::new(0.0..end)
@@ -39,24 +40,24 @@ fn elements() -> impl Iterator<Item = Element> {
     nodes.iter().copied().map(Element::mixed)
 }
 
-/// Prints a ladder and what is seen, and makes a section of both.
+/// Prints a ladder and the sentence on its result, and makes a section of both.
 fn shown(ladder: &Ladder, seen: &str) -> Result<Section, Box<dyn Error>> {
     println!("\n{}\n{ladder}\n{seen}", ladder.title());
     Ok(ladder.section()?.paragraph(seen))
 }
 
-/// The name of the rung that is chosen.
+/// The name of the model that is chosen.
 fn chosen(ladder: &Ladder, accuracy: f64) -> Option<&str> {
     ladder.cheapest(accuracy).map(|one| &*one.rung)
 }
 
-/// The fastest run of one rung with errors of at most `accuracy`.
+/// The fastest run of one model with an error of at most `accuracy`.
 fn fastest(rung: &Rung, accuracy: f64) -> Option<&Choice> {
     let front = rung.front(Cost::Time);
     front.into_iter().find(|one| one.error <= accuracy)
 }
 
-/// Which rung serves for which of the accuracies asked for: "linear for 1e-1, cubic for 1e-2 to 1e-5".
+/// Which model is chosen for which of the accuracies: "linear for 1e-1, cubic for 1e-2 to 1e-5".
 fn served(ladder: &Ladder) -> String {
     let mut spans: Vec<(&str, f64, f64)> = Vec::new();
     for &accuracy in ladder.accuracies() {
@@ -90,12 +91,12 @@ fn model_error(rung: &Rung) -> String {
     }
 }
 
-/// Microseconds of the fastest run of a rung that is so accurate.
+/// The time in microseconds of the fastest run of a model with this accuracy.
 fn micros(choice: Option<&Choice>) -> String {
     choice.map_or_else(|| "—".to_owned(), |one| format!("{:.1}", 1e6 * one.seconds))
 }
 
-/// A table as text, columns aligned.
+/// Prints a table with aligned columns.
 fn print_table<const N: usize>(headings: [&str; N], rows: &[[String; N]]) {
     let mut lines = vec![headings.map(str::to_owned)];
     lines.extend_from_slice(rows);

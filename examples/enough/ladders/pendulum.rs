@@ -1,4 +1,4 @@
-//! A pendulum from small and large angles: linear, cubic, or as it is.
+//! A pendulum with small and large amplitudes: the linear, the cubic and the full model.
 
 use super::{chosen, elements, ladder, model_error, served, shown};
 use std::error::Error;
@@ -6,7 +6,7 @@ use tfe::charts::Section;
 use tfe::fidelity::Ladder;
 use tfe::prelude::*;
 
-/// A pendulum of one metre, and the polynomials of its Lagrangian.
+/// A pendulum of one metre, and the polynomial approximations of its Lagrangian.
 #[dynamics(
     coordinates(theta),
     lagrangian = l^2*dot(theta)^2/2 + g*l*cos(theta),
@@ -26,7 +26,8 @@ pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
     for degrees in degrees {
         ladders.push(swing(degrees)?);
     }
-    // What is a linear pendulum at 5°, to a tenth, is none at 120°, and nobody's but the full one to a millionth.
+    // From 5° the linear model is accurate to a tenth; from 120° only the full one is; and none but the full one
+    // reaches a millionth.
     let rung = |at: usize, accuracy| chosen(&ladders[at], accuracy);
     assert_eq!([0, 1, 2].map(|at| rung(at, 1e-6)), [Some("full"); 3]);
     assert_ne!(rung(0, 1e-1), Some("full"));
@@ -36,7 +37,7 @@ pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
         .map(|(ladder, degrees)| {
             let [linear, cubic] = [0, 1].map(|rung: usize| model_error(&ladder.rungs()[rung]));
             let seen = format!(
-                "Seen: from {degrees}° the linear pendulum errs by {linear} and the cubic one by {cubic}; the cheapest is {}.",
+                "Result: from {degrees}° the linear model has an error of {linear} and the cubic one of {cubic}; the cheapest model is {}.",
                 served(ladder)
             );
             shown(ladder, &seen)

@@ -1,4 +1,4 @@
-//! A heavy top in Euler angles: steady precession, small nutation, the nutation alone, the whole.
+//! A heavy top in Euler angles: steady precession, small nutation, nutation alone, and the full model.
 
 use super::{elements, fastest, ladder, micros, model_error, print_table, served, shown};
 use std::error::Error;
@@ -7,7 +7,8 @@ use tfe::fidelity::{Choice, Ladder};
 use tfe::prelude::*;
 use tfe::runtime::structure::{Operations, Structure};
 
-/// A heavy symmetric top, its precession φ and its spin ψ cyclic. With the momenta of a start, `steady` is the inclination at which it would precess without nodding.
+/// A heavy symmetric top; precession φ and spin ψ are cyclic. `steady` is the inclination at which it would precess
+/// steadily with the momenta of the initial state.
 #[dynamics(
     coordinates(phi, theta, psi),
     lagrangian = a/2*(dot(theta)^2 + dot(phi)^2*sin(theta)^2) + c/2*(dot(psi) + dot(phi)*cos(theta))^2 - mgl*cos(theta),
@@ -26,7 +27,7 @@ struct Top {
 }
 
 impl Top {
-    /// The one with `steady` of the momenta of a start, for tops that spin fast.
+    /// The model with `steady` computed from the momenta of an initial state; for tops that spin fast.
     fn of_start(q: [f64; 3], v: [f64; 3]) -> (Self, State<3>) {
         let mut top = Self {
             a: 1.2,
@@ -39,7 +40,8 @@ impl Top {
         (top, start)
     }
 
-    /// Where nothing accelerates θ, a φ̇² cos θ − p_ψ φ̇ + mgl = 0 with φ̇ = (p_φ − p_ψ cos θ)/(a sin² θ), near the inclination of the start, by bisection.
+    /// The root near the initial inclination at which θ is not accelerated, a φ̇² cos θ − p_ψ φ̇ + mgl = 0 with φ̇ =
+    /// (p_φ − p_ψ cos θ)/(a sin² θ), by bisection.
     fn steady_inclination(&self, start: &State<3>) -> f64 {
         const NEAR: f64 = 0.5;
         let [p_phi, _, p_psi] = start.p;
@@ -51,7 +53,7 @@ impl Top {
         let (mut low, mut high) = (start.q[1] - NEAR, start.q[1] + NEAR);
         while high - low > 4.0 * f64::EPSILON {
             let middle = f64::midpoint(low, high);
-            // Inclined too little it is pulled down, and up if too much.
+            // Where the inclination is too small, gravity increases it, and vice versa.
             if pull(middle) > 0.0 {
                 low = middle;
             } else {
@@ -69,7 +71,7 @@ pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
     for ladder in [&slow, &fast] {
         let errors = [0, 1].map(|rung: usize| ladder.rungs()[rung].model_error());
         assert!(errors[1] < errors[0], "{errors:?}");
-        // Ignored angles leave no error, and nothing else comes below that of small nutation.
+        // Eliminating cyclic coordinates causes no error, and no other model is as accurate as that.
         assert_eq!(ladder.rungs()[2].model_error(), None);
         for rung in &ladder.rungs()[2..] {
             assert!(fastest(rung, 1e-10).is_some(), "{}", rung.name());
@@ -84,12 +86,12 @@ pub fn sections() -> Result<Vec<Section>, Box<dyn Error>> {
     Ok(sections)
 }
 
-/// Inclined by 0.9, for ten seconds.
+/// Initial inclination 0.9, for ten seconds.
 fn nodding(spin: f64) -> Result<Ladder, Box<dyn Error>> {
     let (top, start) = Top::of_start([0.3, 0.9, -0.2], [0.4, 0.1, spin]);
     let precession = Precession::of(&top);
     let ([p_phi, _, p_psi], [phi, _, psi]) = (start.p, start.q);
-    // The same momenta, without the one of the nutation.
+    // The same momenta, without that of the nutation.
     let turning = State {
         q: [phi, psi],
         p: [p_phi, p_psi],
@@ -107,10 +109,10 @@ fn nodding(spin: f64) -> Result<Ladder, Box<dyn Error>> {
 }
 
 const HEADINGS: [&str; 9] = [
-    "rung",
+    "model",
     "unknowns",
-    "operations: first",
-    "second",
+    "operations: gradient",
+    "with Hessian",
     "model error",
     "µs for 1e-4",
     "evaluations",
@@ -159,13 +161,13 @@ fn sentence(ladder: &Ladder) -> String {
     let [reduced, full] = [2, 3].map(|rung: usize| fastest(&ladder.rungs()[rung], 1e-8));
     let saved = match (reduced, full) {
         (Some(reduced), Some(full)) => format!(
-            "the nutation alone reaches 1e-8 in 1/{:.1} of the time of the whole, without an error of its own: its mass is constant, so that forces are its only unknowns",
+            "the nutation alone reaches 1e-8 in 1/{:.1} of the time of the full model, without a model error: its mass matrix is constant, so that the forces are its only unknowns",
             full.seconds / reduced.seconds
         ),
-        _ => "the time of 1e-8 is not known".to_owned(),
+        _ => "the time for 1e-8 is not known".to_owned(),
     };
     format!(
-        "Seen: steady precession errs by {steady} and a nutation of small angles by {small}; {saved}; the cheapest is {}.",
+        "Result: steady precession has an error of {steady} and nutation of small angles one of {small}; {saved}; the cheapest model is {}.",
         served(ladder)
     )
 }

@@ -1,9 +1,9 @@
-//! Many coordinates: the lattice of Fermi, Pasta, Ulam and Tsingou.
+//! A system with many coordinates: the lattice of Fermi, Pasta, Ulam and Tsingou.
 
 use super::{Start, steps};
 use tfe::prelude::*;
 
-/// Unit masses between walls, 33 springs of force δ + a δ².
+/// Unit masses between walls, joined by 33 springs of force δ + a δ².
 #[dynamics(
     coordinates(q[32]),
     lagrangian = sum(i in 0..32, dot(q[i])^2/2)
@@ -16,7 +16,7 @@ pub struct Lattice {
 
 pub const LATTICE: Lattice = Lattice { a: 0.25 };
 
-/// From rest, with all modes at work.
+/// From rest, with energy in all modes.
 pub fn lattice_start() -> Start<32> {
     let mut q = [0.0; 32];
     for (i, q) in (1..).zip(&mut q) {

@@ -1,20 +1,20 @@
-//! The scenes: a module for each kind. Each scene is a model, a start and what is measured.
+//! The scenes: one module for each kind. Each scene has a model, an initial state and the measurements.
 
 pub mod lattice;
 pub mod oscillators;
 pub mod planets;
 pub mod stiff;
 
-/// Where a motion starts, and when it ends.
+/// The initial coordinates and velocities, and the time at the end.
 #[derive(Clone, Copy, Debug)]
 pub struct Start<const N: usize> {
     pub q: [f64; N],
     pub v: [f64; N],
-    /// From zero.
+    /// The end of the span, which begins at zero.
     pub end: f64,
 }
 
-/// So many equal steps from zero to `end`, each time a quarter more or less.
+/// Step sizes for `fewest` to `most` equal steps between zero and `end`, with a quarter more steps each time.
 pub fn steps(end: f64, fewest: u32, most: u32) -> impl Iterator<Item = f64> {
     let counts = std::iter::successors(Some(fewest), |count| Some(count + count.div_ceil(4)));
     counts
@@ -22,7 +22,7 @@ pub fn steps(end: f64, fewest: u32, most: u32) -> impl Iterator<Item = f64> {
         .map(move |count| end / f64::from(count))
 }
 
-/// A step for people: three digits.
+/// A step size with three digits, for tables.
 pub fn short(step: f64) -> String {
     let magnitude = step.abs().log10().floor();
     let unit = 10_f64.powf(magnitude - 2.0);

@@ -1,9 +1,9 @@
-//! Few coordinates, smooth motions.
+//! Systems with few coordinates and smooth motions.
 
 use super::{Start, steps};
 use tfe::prelude::*;
 
-/// In units of √(l/g).
+/// A pendulum; time in units of √(l/g).
 #[dynamics(coordinates(q), lagrangian = dot(q)^2/2 + cos(q))]
 pub struct Pendulum {}
 
@@ -15,7 +15,7 @@ pub const PENDULUM_START: Start<1> = Start {
     end: 10.0,
 };
 
-/// From rest at two radians; the end by 32 digits of arithmetic.
+/// From rest at two radians. The reference at the end was computed with 32 digits.
 pub fn pendulum() -> WorkPrecision<'static, Pendulum, State<1>> {
     let Start { q, v, end } = PENDULUM_START;
     WorkPrecision::new(&PENDULUM, PENDULUM.state(q, v), 0.0..end)
@@ -23,7 +23,7 @@ pub fn pendulum() -> WorkPrecision<'static, Pendulum, State<1>> {
         .reference_end([0.7131481806013794], [-1.5313085041358347])
 }
 
-/// A star in a galaxy.
+/// The Hénon–Heiles system: a star in a galaxy.
 #[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + x^2*y - y^3/3)]
 pub struct HenonHeiles {}
 
@@ -33,7 +33,7 @@ pub const HENON_HEILES_START: Start<2> = Start {
     end: 100.0,
 };
 
-/// A chaotic one. The end by 20 digits of arithmetic.
+/// A chaotic orbit. The reference at the end was computed with 20 digits.
 pub fn henon_heiles() -> WorkPrecision<'static, HenonHeiles, State<2>> {
     let Start { q, v, end } = HENON_HEILES_START;
     WorkPrecision::new(&HenonHeiles {}, State { q, p: v }, 0.0..end)
@@ -60,7 +60,7 @@ pub const DOUBLE_PENDULUM_START: Start<2> = Start {
     end: 10.0,
 };
 
-/// Two equal point masses on rods of one metre, in regular motion. Its end is known to 13 digits.
+/// Two equal point masses on massless rods of one metre, in regular motion. The reference at the end has 13 digits.
 pub fn double_pendulum() -> WorkPrecision<'static, DoublePendulum, State<2>> {
     let Start { q, v, end } = DOUBLE_PENDULUM_START;
     let last = DOUBLE_PENDULUM.state(
@@ -86,7 +86,7 @@ pub const VAN_DER_POL_START: Start<1> = Start {
     end: 20.0,
 };
 
-/// Onto its limit cycle and three times around; energy is no invariant.
+/// Approaches the limit cycle and goes around it three times; energy is not conserved.
 pub fn van_der_pol() -> WorkPrecision<'static, VanDerPol, State<1>> {
     let Start { q, v, end } = VAN_DER_POL_START;
     WorkPrecision::new(&VAN_DER_POL, VAN_DER_POL.state(q, v), 0.0..end).steps(steps(end, 20, 800))

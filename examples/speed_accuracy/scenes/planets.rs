@@ -1,4 +1,4 @@
-//! Gravity.
+//! Motions under gravity.
 
 use super::{Start, steps};
 use tfe::prelude::*;
@@ -12,7 +12,7 @@ pub const KEPLER_START: Start<2> = Start {
     end: 20.0,
 };
 
-/// Eccentricity 0.6, from the pericentre, three times around. The end by 32 digits of arithmetic.
+/// Eccentricity 0.6, three revolutions from the pericentre. The reference at the end was computed with 32 digits.
 pub fn kepler() -> WorkPrecision<'static, Kepler, State<2>> {
     let Start { q, v, end } = KEPLER_START;
     WorkPrecision::new(&Kepler {}, State { q, p: v }, 0.0..end)
@@ -23,7 +23,7 @@ pub fn kepler() -> WorkPrecision<'static, Kepler, State<2>> {
         )
 }
 
-/// Bodies that attract each other: `x`, `y`, `z` of each.
+/// Bodies that attract each other; `x`, `y`, `z` are the coordinates of all of them.
 #[dynamics(
     coordinates(x[6], y[6], z[6]),
     lagrangian = sum(i in 0..6, m[i]/2*(dot(x[i])^2 + dot(y[i])^2 + dot(z[i])^2))
@@ -34,8 +34,8 @@ pub struct Bodies {
     pub m: [f64; 6],
 }
 
-/// Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune, Pluto: mass (of the Sun's), position (astronomical units), velocity (a day).
-/// [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.2.4]
+/// The Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune and Pluto: masses in solar masses, positions in
+/// astronomical units, velocities per day [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.2.4].
 const BODIES: [(f64, [f64; 3], [f64; 3]); 6] = [
     (1.000_005_976_82, [0.0; 3], [0.0; 3]),
     (
@@ -77,7 +77,7 @@ pub const SOLAR_SYSTEM: Bodies = Bodies {
     ],
 };
 
-/// 27 years, two and a half of Jupiter's.
+/// 27 years, about two and a quarter revolutions of Jupiter.
 pub fn solar_system_start() -> Start<18> {
     let (mut q, mut v) = ([0.0; 18], [0.0; 18]);
     for (i, (_, position, velocity)) in BODIES.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Two times in one motion: a pendulum on a stiff spring.
+//! Two time scales in one motion: a pendulum on a stiff spring.
 
 use super::{Start, steps};
 use tfe::prelude::*;
@@ -20,8 +20,8 @@ pub const ELASTIC_START: Start<2> = Start {
     end: 1.0,
 };
 
-/// The spring swings 160 times a second, the pendulum once in two. The momentum of the spring is the small part of the state, and its
-/// phase is what the errors of long steps are of.
+/// The spring oscillates 160 times per unit of time, the pendulum once in two. The momentum of the spring is only a
+/// small part of the state, but with long steps its phase dominates the error.
 pub fn elastic_pendulum() -> WorkPrecision<'static, ElasticPendulum, State<2>> {
     let Start { q, v, end } = ELASTIC_START;
     WorkPrecision::new(&ELASTIC, ELASTIC.state(q, v), 0.0..end).steps(steps(end, 10, 1000))
