@@ -1,4 +1,4 @@
-//! A rigid body in space, by a unit quaternion.
+//! A rigid body in space, described by a unit quaternion.
 
 use crate::Outcome;
 use crate::runs::{Energy, Run, Scene};
@@ -7,7 +7,8 @@ use tfe::prelude::*;
 
 /// A symmetric top with a fixed point; consistent units.
 ///
-/// The kinetic energy does not see the length of e: the mass matrix of the four coordinates is singular, and the element does not mind.
+/// The kinetic energy does not depend on the rate of change of |e|, so that the mass matrix of the four coordinates is
+/// singular. The element solves for the velocities together with the constraint and needs no regular mass matrix.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -35,14 +36,14 @@ pub fn top() -> Outcome {
         j3: 0.5,
         mgd: 1.0,
     };
-    // A turn of TILT about x; de/dt = ½ e∘(0, 0, 0, SPIN).
+    // A rotation by TILT about x; de/dt = ½ e∘(0, 0, 0, SPIN).
     let (sin, cos) = (TILT / 2.0).sin_cos();
     let start = model.state(
         [cos, sin, 0.0, 0.0],
         [0.0, 0.0, -SPIN * sin / 2.0, SPIN * cos / 2.0],
     );
     let short = Run::of(&model, Mixed::<6>, 0.05, start, 2.0)?;
-    // At t = 2, of 16 digits.
+    // The reference at t = 2, with 16 digits.
     let reference = [
         0.939_715_778_002_366_2,
         0.133_430_668_539_187_67,
@@ -71,8 +72,8 @@ pub fn top() -> Outcome {
             .map(|e| vec![Part::rod(foot, tip(e)), Part::Mass(tip(e))]),
     )
     .to_svg()?;
-    let text = "Four coordinates, |e|² = 1. Let go at an inclination of 0.5 with nothing but its spin, the top falls, rises and \
-                precesses: its tip describes cusps.";
+    let text = "Four coordinates with |e|² = 1. Released at an inclination of 0.5 with nothing but its spin, the top falls, rises and \
+                precesses: the path of its tip has cusps.";
     Ok(Scene::new("A heavy top", text).row(row).picture(
         "top",
         picture,

@@ -1,4 +1,5 @@
-//! The car axis, a test problem for solvers of constrained systems: a stiff suspension on a bumpy road, with constraints that hold the time.
+//! The car axis, a test problem for solvers of constrained systems: a stiff suspension on a bumpy road, with
+//! constraints that depend on time.
 
 use crate::Outcome;
 use crate::runs::{Energy, Run, Scene};
@@ -7,8 +8,9 @@ use std::error::Error;
 use tfe::charts::{Axis, Chart, Scale, Style};
 use tfe::prelude::*;
 
-/// An axle of length l with a mass at both ends, on springs over wheels at (0, 0) and (xb, yb). The right wheel goes over bumps; the left
-/// spring stays perpendicular to the line between the wheels. Consistent units, of stiffness 1.
+/// An axle of length l with a mass at each end, on springs over wheels at (0, 0) and (xb, yb). The right wheel moves up
+/// and down over bumps; the left spring remains perpendicular to the line between the wheels. Consistent units, in
+/// which the stiffness is 1.
 #[dynamics(
     coordinates(xl, yl, xr, yr),
     let yb = r*sin(omega*t),
@@ -20,12 +22,12 @@ use tfe::prelude::*;
     constraint(axle) = (xl - xr)^2 + (yl - yr)^2 - l^2,
 )]
 struct CarAxis {
-    /// Mass of an end: ε²M/2 with ε = 0.01, M = 10.
+    /// The mass at each end: ε²M/2 with ε = 0.01, M = 10.
     m: f64,
     g: f64,
     l: f64,
     l0: f64,
-    /// Height of the bumps.
+    /// The height of the bumps.
     r: f64,
     omega: f64,
 }
@@ -38,7 +40,7 @@ impl CarAxis {
 }
 
 const END: f64 = 3.0;
-/// xl, yl, xr, yr at the end.
+/// Reference values of xl, yl, xr, yr at the end.
 const REFERENCE: [f64; 4] = [
     0.049_345_578_427_524_09,
     0.496_989_460_230_008_1,
@@ -62,7 +64,7 @@ pub fn scene() -> Outcome {
     let mut scene = Scene::new(
         "The car axis",
         "An axle on springs; the left wheel rolls on a level road, the right one over bumps. The springs are stiff, the masses small, \
-         and both constraints are holonomic; one moves with the road.",
+         and both constraints are holonomic; one depends on time through the road.",
     );
     for nodes in 4..=6 {
         let run = Run::of(&model, Element::mixed(nodes), 0.01, start, END)?;
@@ -101,15 +103,15 @@ pub fn scene() -> Outcome {
         .ground([Part::Mass((0.0, 0.0))])
         .shots(shots)
         .to_svg()?;
-    let text = "Paths over 3 units of time, the axis at 13 times of the first 0.6.";
+    let text = "Paths over 3 units of time, the axle at 13 times within the first 0.6.";
     Ok(scene
         .picture("car_axis", picture, text)
         .picture("car_axis_work", chart, caption))
 }
 
-/// Time against error, and what the fastest run with an error below the target takes.
+/// The chart of time against error, and the time of the fastest run with an error below the target.
 fn work(model: &CarAxis, start: &State<4>) -> Result<(String, String), Box<dyn Error>> {
-    let mut chart = Chart::new("Car axis: time against error")
+    let mut chart = Chart::new("Car axis: error over time of the run")
         .x(Axis::new("time of a run (ms)").scale(Scale::Logarithmic))
         .y(Axis::new("error of the coordinates at t = 3").scale(Scale::Logarithmic));
     let (mut missing, mut fastest) = (0, f64::INFINITY);
@@ -120,7 +122,8 @@ fn work(model: &CarAxis, start: &State<4>) -> Result<(String, String), Box<dyn E
             let runs: Result<Vec<_>, _> = (0..REPETITIONS)
                 .map(|_| Run::of(model, element, step, *start, END))
                 .collect();
-            // A step that does not resolve the springs may have no solution: a point less, and counted.
+            // With a step that does not resolve the springs there may be no solution: the point is left out, and
+            // counted.
             let Ok(runs) = runs else {
                 missing += 1;
                 continue;
@@ -142,7 +145,7 @@ fn work(model: &CarAxis, start: &State<4>) -> Result<(String, String), Box<dyn E
         "Steps from 0.04 to 0.005, the best time of {REPETITIONS} runs, on one processor. An error below 10⁻⁸ takes {fastest:.1} ms."
     );
     if missing > 0 {
-        caption += &format!(" {missing} of the coarsest runs came to no end.");
+        caption += &format!(" {missing} of the runs with the longest steps failed.");
     }
     Ok((chart.to_svg()?, caption))
 }

@@ -1,11 +1,11 @@
-//! Five point masses on five rods, in Cartesian coordinates and in angles.
+//! Five point masses on five rods, in Cartesian coordinates with constraints and in angles without.
 
 use crate::Outcome;
 use crate::runs::{Energy, Run, Scene, distance};
 use crate::stroboscope::{Part, Point, Stroboscope};
 use tfe::prelude::*;
 
-/// Point masses that hang on each other by rods of equal lengths, the first on the origin; SI units.
+/// Point masses that hang from each other by rods of equal lengths, the first rod from the origin; SI units.
 #[dynamics(
     coordinates(x[5], y[5]),
     lagrangian = sum(i in 0..5, m/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
@@ -18,7 +18,7 @@ struct Chain {
     g: f64,
 }
 
-/// The same in angles from the downward vertical. Link j carries the 5 − j masses from its own to the last.
+/// The same chain in angles from the downward vertical. Rod j carries the 5 − j masses from its own to the last.
 #[dynamics(
     coordinates(theta[5]),
     lagrangian = sum(i in 0..5, sum(j in 0..5,
@@ -74,9 +74,9 @@ pub fn scene() -> Outcome {
         )
         .shots(run.samples_until(1.2, 18)?.iter().map(shot))
         .to_svg()?;
-    let text = "Ten coordinates and five rods, beside the same chain in five angles with a full mass matrix.";
+    let text = "Ten coordinates and five rods, compared with the same chain in five angles with a full mass matrix.";
     let times = format!(
-        "The run takes {:.1} ms, that in angles {:.1} ms.",
+        "The run takes {:.1} ms, and in angles {:.1} ms.",
         1e3 * run.seconds,
         1e3 * same.seconds
     );

@@ -1,4 +1,4 @@
-//! Closed loops of rods and joints.
+//! Linkages: closed loops of rods and joints.
 
 use crate::Outcome;
 use crate::runs::{Energy, Run, Scene, distance};
@@ -6,7 +6,8 @@ use crate::stroboscope::{Part, Point, Stroboscope, seen};
 use std::f64::consts::TAU;
 use tfe::prelude::*;
 
-/// A crank, a connecting rod and a slider on a level line; angles of crank (up) and rod (down) from the line; SI units.
+/// A crank, a connecting rod, and a slider on a horizontal line; the angles of crank (upwards) and rod (downwards) are
+/// measured from the line; SI units.
 #[dynamics(
     coordinates(crank, rod, x),
     let rod_x = r*cos(crank) + l/2*cos(rod),
@@ -25,7 +26,7 @@ struct SliderCrank {
     g: f64,
 }
 
-/// The same with the loop solved for the crank.
+/// The same mechanism with one coordinate: the loop is solved for the angle of the crank.
 #[dynamics(
     coordinates(crank),
     let rod = asin(r/l*sin(crank)),
@@ -63,7 +64,7 @@ pub fn slider_crank() -> Outcome {
         g,
     };
     let (rate, end) = (8.0, 3.0);
-    // At the dead centre the slider stands, and the rod turns with r rate/l.
+    // At the dead centre the slider is at rest, and the rod rotates at r rate/l.
     let start = model.state([0.0, 0.0, r + l], [rate, r * rate / l, 0.0]);
     let run = Run::of(&model, Mixed::<6>, 0.01, start, end)?;
     let same = Run::of(
@@ -109,7 +110,7 @@ pub fn slider_crank() -> Outcome {
         )
         .shots(run.samples_until(turn, 16)?.iter().map(shot))
         .to_svg()?;
-    let text = "Three coordinates and a loop of two equations, beside the model with the loop solved by hand.";
+    let text = "Three coordinates and a loop of two equations, compared with the model in which the loop is solved by hand.";
     Ok(Scene::new("A slider–crank", text).row(row).picture(
         "slider_crank",
         picture,
@@ -117,7 +118,7 @@ pub fn slider_crank() -> Outcome {
     ))
 }
 
-/// A four-bar linkage of massless rods with masses in its joints, pivots at (0, 0) and (d, 0); SI units.
+/// A four-bar linkage of massless rods with point masses at its joints, pivots at (0, 0) and (d, 0); SI units.
 #[dynamics(
     coordinates(x1, y1, x2, y2),
     lagrangian = m/2*(dot(x1)^2 + dot(y1)^2 + dot(x2)^2 + dot(y2)^2) - m*g*(y1 + y2),
@@ -134,7 +135,8 @@ struct FourBar {
     g: f64,
 }
 
-/// Where the joints of a four-bar linkage are for an angle of the crank; the coupler on the side of the crank's left.
+/// The positions of the joints of a four-bar linkage for an angle of the crank, with the coupler to the left of the
+/// crank.
 fn assembled(model: &FourBar, angle: f64) -> [f64; 4] {
     let (x1, y1) = (model.a * angle.cos(), model.a * angle.sin());
     let (dx, dy) = (model.d - x1, -y1);
@@ -149,7 +151,7 @@ fn assembled(model: &FourBar, angle: f64) -> [f64; 4] {
     ]
 }
 
-/// A parallelogram's one coordinate.
+/// The parallelogram linkage with one coordinate.
 #[dynamics(coordinates(theta), lagrangian = m*a^2*dot(theta)^2 - 2*m*g*a*sin(theta))]
 struct Parallelogram {
     a: f64,
@@ -208,10 +210,10 @@ pub fn parallelogram() -> Outcome {
             .map(|q| bars((0.0, 0.0), (q[0], q[1]), (q[2], q[3]), (d, 0.0))),
     )
     .to_svg()?;
-    let text = "With opposite bars equal, the linkage can be folded flat, and there its constraints are dependent: two motions \
-                branch, the parallelogram and the crossed one. Elements step over the flat positions, since no node lies in them.";
+    let text = "With opposite bars of equal length, the linkage can be folded flat. In this position its constraints are dependent and two motions \
+                branch off, the parallelogram and the crossed one. The elements step over the flat positions, since no node lies exactly in them.";
     let caption = format!(
-        "One turn. In the whole run the linkage goes {flat} times through a flat position and stays a parallelogram."
+        "One turn. In the whole run the linkage passes {flat} times through a flat position and remains a parallelogram."
     );
     Ok(
         Scene::new("A four-bar linkage through its flat position", text)
@@ -228,8 +230,8 @@ fn bars(start: Point, first: Point, second: Point, end: Point) -> Vec<Part> {
     ]
 }
 
-/// A four-bar linkage in space. Its pivots have the axis n, (0, 0, 0) and (d, 0, 0) lie on them; the hinge of the coupler repeats what the
-/// others say already. SI units.
+/// A four-bar linkage in space. Its pivots lie at (0, 0, 0) and (d, 0, 0), with axes along n. The hinge of the coupler
+/// adds a constraint that the others imply already (redundant). SI units.
 #[dynamics(
     coordinates(r[3], s[3]),
     let n = [0, -sin(tilt), cos(tilt)],
@@ -263,7 +265,8 @@ pub fn spatial_four_bar() -> Outcome {
         g,
         tilt,
     };
-    // In its plane: the same linkage with the gravity along the plane, and without a row too many.
+    // The same linkage in its plane, with the component of gravity along the plane and without the redundant
+    // constraint.
     let plane = FourBar {
         a,
         b,
@@ -291,7 +294,7 @@ pub fn spatial_four_bar() -> Outcome {
         "planar linkage",
     );
     let rank = run.motion.constraint_residual().rank;
-    assert_eq!(rank, 5, "six coordinates that move in one way");
+    assert_eq!(rank, 5, "six coordinates with one degree of freedom");
     let joint = |q: &[f64; 6]| (seen([q[0], q[1], q[2]]), seen([q[3], q[4], q[5]]));
     let (start, end) = (seen([0.0; 3]), seen([d, 0.0, 0.0]));
     let samples = run.samples(81)?;
@@ -312,8 +315,8 @@ pub fn spatial_four_bar() -> Outcome {
         )
         .to_svg()?;
     let text = format!(
-        "Six coordinates, six constraints, of which {rank} are independent: a linkage that moves all the same. The redundant row is \
-         found at the start of each element; reactions are those of least norm."
+        "Six coordinates, six constraints, of which {rank} are independent, so that one degree of freedom remains. The redundant row is \
+         found at the start of each element; among all possible reactions those of least norm are chosen."
     );
     Ok(
         Scene::new("A four-bar linkage in space, with a redundant hinge", &text)
@@ -321,16 +324,17 @@ pub fn spatial_four_bar() -> Outcome {
             .picture(
                 "spatial_four_bar",
                 picture,
-                "A crank and rocker in a tilted plane, seen from the right, the front and above.",
+                "A crank–rocker linkage in a tilted plane, seen from the right, the front and above.",
             ),
     )
 }
 
-/// Velocities of the joints for a rate of the crank.
+/// The velocities of the joints for an angular velocity of the crank.
 fn velocity(model: &FourBar, q: &[f64; 4], rate: f64) -> [f64; 4] {
     let [x1, y1, x2, y2] = *q;
     let (v1, w1) = (-rate * y1, rate * x1);
-    // The second joint turns about the right pivot; its velocity along the coupler is that of the first.
+    // The second joint rotates about the right pivot, and its velocity along the coupler equals that of the first
+    // joint.
     let (ex, ey) = (x2 - x1, y2 - y1);
     let turning = (ex * v1 + ey * w1) / (-ex * y2 + ey * (x2 - model.d));
     [v1, w1, -turning * y2, turning * (x2 - model.d)]

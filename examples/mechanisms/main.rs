@@ -5,8 +5,10 @@
 //! cargo run --release --example mechanisms -- folder
 //! ```
 //!
-//! Each module holds the scenes of one kind: their models, how they are run and compared, their pictures. The table has for every run the
-//! largest |φ| and |A v + a| over all nodes, the largest change of the energy, and the error of the coordinates at the end.
+//! The table shows for each run how well the constraints hold: the largest |φ| (positions) and |A v + a| (velocities)
+//! over all nodes; the largest relative change of the energy; the error of the coordinates at the end and what they are
+//! compared with; and the time of the run. Each module holds the scenes of one kind, with their models, runs,
+//! comparisons and pictures.
 
 mod bodies;
 mod car_axis;
@@ -64,8 +66,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let summary = Section::new("All runs")
         .paragraph(
-            "The largest violation of the constraints at the nodes, of positions (φ) and of velocities (A v + a); the largest change \
-             of the energy, relative to that at the start; the error of the coordinates at the end, and against what; the time of \
+            "The largest violation of the constraints at the nodes, for positions (φ) and for velocities (A v + a); the largest change \
+             of the energy, relative to that at the start; the error of the coordinates at the end, and what they are compared with; the time of \
              the run, on one processor.",
         )
         .table(HEADER, rows);

@@ -1,4 +1,4 @@
-//! Blades: bodies that slide along one direction of theirs, but not across.
+//! Blades: bodies that can slide along one body-fixed direction, but not across it (nonholonomic constraints).
 
 use crate::Outcome;
 use crate::runs::{Energy, Run, Scene};
@@ -35,7 +35,7 @@ pub fn knife_edge() -> Outcome {
         model.state([0.0; 3], [0.0, 0.0, w]),
         end,
     )?;
-    // x = b sin² wt, y = b (wt − ½ sin 2wt), b = g sin α/2w².
+    // The closed form: x = b sin² wt, y = b (wt − ½ sin 2wt), b = g sin α/2w².
     let b = model.g * model.alpha.sin() / (2.0 * w * w);
     let angle = w * end;
     let exact = [
@@ -49,7 +49,7 @@ pub fn knife_edge() -> Outcome {
         run.error(&exact),
         "closed form",
     );
-    // In the picture downhill is down.
+    // In the picture, downhill points down.
     let plate = |q: &[f64; 3]| vec![Part::block((q[1], -q[0]), q[2] - FRAC_PI_2, 0.7, 0.3)];
     let picture = Stroboscope::new("Knife edge on an incline", "across (m)", "uphill (m)")
         .path(
@@ -58,9 +58,9 @@ pub fn knife_edge() -> Outcome {
         )
         .shots(run.samples(41)?.iter().map(plate))
         .to_svg()?;
-    let text = "A plate slides down an incline on a blade and turns at a constant rate. It does not go down for good: it \
-                describes a cycloid across the incline.";
-    let caption = "From rest but for its turning, 10 s.";
+    let text = "A plate on a blade slides on an incline and turns at a constant rate. It does not keep going down, but \
+                moves along a cycloid across the incline.";
+    let caption = "10 s; at the start the plate turns but does not move.";
     Ok(Scene::new("A knife edge", text)
         .row(row)
         .picture("knife_edge", picture, caption))
@@ -78,17 +78,18 @@ struct Sleigh {
     a: f64,
 }
 
-/// Its motion: v = c tanh τ along the blade, ω = (c/k) sech τ, θ = (2k/a) arctan tanh(τ/2), τ = (ac/k²)(t − t_0).
+/// The closed form of its motion: v = c tanh τ along the blade, ω = (c/k) sech τ, θ = (2k/a) arctan tanh(τ/2), τ =
+/// (ac/k²)(t − t_0).
 struct SleighMotion {
     k: f64,
     a: f64,
     c: f64,
-    /// When it turns fastest.
+    /// The time t₀, when it turns fastest.
     t_0: f64,
 }
 
 impl SleighMotion {
-    /// v, ω, θ.
+    /// v, ω, θ at a time.
     fn at(&self, t: f64) -> [f64; 3] {
         let Self { k, a, c, t_0 } = *self;
         let tau = a * c / (k * k) * (t - t_0);
@@ -114,7 +115,7 @@ pub fn sleigh() -> Outcome {
         t_0: 3.5,
     };
     let end = 8.0;
-    // The centre of mass moves with the blade's v along it and with aω across.
+    // The velocity of the centre of mass: v along the blade and aω across it.
     let [v, omega, theta] = exact.at(0.0);
     let (sin, cos) = theta.sin_cos();
     let across = model.a * omega;
@@ -180,8 +181,8 @@ pub fn sleigh() -> Outcome {
         )
         .shots(run.samples(17)?.iter().map(shot))
         .to_svg()?;
-    let text = "Energy is conserved and yet all motions end alike: the sleigh turns round until its centre of mass runs ahead of \
-                the blade, and goes straight. No Hamiltonian system does that.";
+    let text = "Energy is conserved, and yet all motions approach the same one: the sleigh turns until its centre of mass is ahead of \
+                the blade, and then goes straight. This is impossible in a Hamiltonian system.";
     Ok(Scene::new("The Chaplygin sleigh", text)
         .row(row)
         .picture(

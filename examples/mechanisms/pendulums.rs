@@ -1,4 +1,4 @@
-//! One body on a rod, and one on a wire.
+//! A pendulum with a rigid rod, and a bead on a wire.
 
 use crate::Outcome;
 use crate::runs::{Energy, Run, Scene};
@@ -25,7 +25,7 @@ pub fn pendulum() -> Outcome {
         g: 9.81,
     };
     let start = model.state([1.0, 0.0], [0.0, 0.0]);
-    // By elliptic functions, at t = 5 s.
+    // The reference at t = 5 s, by elliptic functions.
     let reference = [0.942_305_435_043_757_3, -0.334_754_338_414_000_6];
     let run = Run::of(&model, Mixed::<6>, 0.05, start, 5.0)?;
     let error = run.error(&reference);
@@ -41,7 +41,7 @@ pub fn pendulum() -> Outcome {
         ),
     ];
 
-    // Released at the height of the pivot: v² = −2gy, and the rod carries m v²/l − mg y/l = −3mg y/l.
+    // Released at the height of the pivot: v² = −2gy, and the tension of the rod is m v²/l − mg y/l = −3mg y/l.
     let nodes = run.motion.states();
     let tension = |y: f64| -3.0 * model.m * model.g * y / model.l;
     let lambda = run
@@ -49,7 +49,7 @@ pub fn pendulum() -> Outcome {
         .reactions()
         .column("rod")
         .ok_or("no reaction of the rod")?;
-    // The force λ ∂φ/∂q = 2λ (x, y) pulls towards the pivot.
+    // The force λ ∂φ/∂q = 2λ (x, y) points towards the pivot.
     let pull: Vec<(f64, f64)> = nodes
         .iter()
         .zip(&lambda)
@@ -60,8 +60,9 @@ pub fn pendulum() -> Outcome {
         .zip(&pull)
         .map(|(node, (_, pull))| (pull - tension(node.q[1])).abs());
     let worst = worst.max_by(f64::total_cmp).ok_or("no node")?;
-    // A function of the state at the node: right but for the energy, which is off by roundings at this step. The tension is up to 29 N.
-    assert!(worst < 1e-9, "the tension is off by {worst:e} N");
+    // The tension is a function of the state at the node, so that its error is that of the state: little more than
+    // rounding with this step. It is at most 29 N.
+    assert!(worst < 1e-9, "the tension has an error of {worst:e} N");
     let exact = run
         .samples(401)?
         .into_iter()
@@ -74,7 +75,7 @@ pub fn pendulum() -> Outcome {
         .series("−2λl", Style::Markers, pull);
 
     let at = |q: &[f64; 2]| (q[0], q[1]);
-    // Half a period, 2 K(1/√2) √(l/g).
+    // Half a period of the swing, 2 K(1/√2) √(l/g).
     let swing = 2.0 * 1.854_074_677_301_372 * (model.l / model.g).sqrt();
     let picture = Stroboscope::new("Pendulum with a rod: the first swing", "x (m)", "y (m)")
         .ground([Part::Pivot((0.0, 0.0))])
@@ -86,8 +87,8 @@ pub fn pendulum() -> Outcome {
         .to_svg()?;
     let scene = Scene::new(
         "A pendulum with a rod",
-        "A mass in Cartesian coordinates on a rod, x² + y² = l². The element fulfils the constraint at its nodes, not its second \
-         derivative somewhere. Two primal nodes with Lobatto points are the RATTLE method.",
+        "A mass in Cartesian coordinates on a rod, x² + y² = l². The element satisfies the constraint itself at its nodes, not only its second \
+         time derivative. Two primal nodes with Lobatto quadrature are the RATTLE method.",
     );
     let [fine, rattle] = rows;
     Ok(scene
@@ -97,7 +98,7 @@ pub fn pendulum() -> Outcome {
         .picture(
             "pendulum_tension",
             chart.to_svg()?,
-            format!("The reaction at the nodes; it differs from the closed form by {worst:.0e} N at most."),
+            format!("The tension at the nodes, from the multiplier λ; it differs from the closed form by at most {worst:.0e} N."),
         ))
 }
 
@@ -116,7 +117,7 @@ pub fn bead() -> Outcome {
     let model = Bead { m: 1.0, g: 9.81 };
     let start = model.state([1.2, wire(1.2)], [0.0, 0.0]);
     let run = Run::of(&model, Mixed::<5>, 0.02, start, 2.0)?;
-    // Of twelve digits, at t = 2 s.
+    // The reference at t = 2 s, with twelve digits.
     let error = run.error(&[0.239_289_318_946_371, 0.000_819_659_096_869_522_1]);
     let row = run.row("bead on a wire", Energy::Conserved, error, "12 digits");
     let curve = (0..=200)
@@ -132,7 +133,8 @@ pub fn bead() -> Outcome {
                 .map(|q| vec![Part::Mass(bead(q))]),
         )
         .to_svg()?;
-    let text = "The wire is not quadratic, and φ = y − x⁴/4 vanishes at all nodes nevertheless.";
+    let text =
+        "Although the constraint φ = y − x⁴/4 is not quadratic, it is satisfied at all nodes.";
     Ok(Scene::new("A bead on a wire", text).row(row).picture(
         "bead",
         picture,

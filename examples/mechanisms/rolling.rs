@@ -1,4 +1,4 @@
-//! Wheels that roll without slip.
+//! Wheels that roll without slip (nonholonomic constraints).
 
 use crate::Outcome;
 use crate::runs::{Energy, Run, Scene};
@@ -7,7 +7,8 @@ use std::error::Error;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, TAU};
 use tfe::prelude::*;
 
-/// A coin that rolls upright on an incline, x downhill; its heading φ from there, its rolling angle ψ; SI units.
+/// A coin that rolls upright on an incline, x downhill; its heading φ is measured from there, ψ is its rolling angle;
+/// SI units.
 #[dynamics(
     coordinates(x, y, phi, psi),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2) + m*r^2/8*dot(phi)^2 + m*r^2/4*dot(psi)^2 + m*g*sin(alpha)*x,
@@ -21,8 +22,9 @@ struct Coin {
     alpha: f64,
 }
 
-/// What comes out when L + μ·Ψ is varied without the correction force. The multipliers μ are the rates of two coordinates more, whose
-/// equations, dΨ/dt = 0, keep what a start without slip has.
+/// The model that results from varying L + μ·Ψ without the correction force of the nonholonomic constraints Ψ = 0 (the
+/// vakonomic equations). The multipliers μ are the rates of two additional coordinates, whose equations, dΨ/dt = 0,
+/// keep an initial state without slip free of slip.
 #[dynamics(
     coordinates(x, y, phi, psi, nu_x, nu_y),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2) + m*r^2/8*dot(phi)^2 + m*r^2/4*dot(psi)^2 + m*g*sin(alpha)*x
@@ -46,7 +48,8 @@ pub fn coin() -> Outcome {
         model.state([0.0; 4], [0.0, 0.0, w, 0.0]),
         end,
     )?;
-    // A thin disk feels m + I/r² = 3m/2: x = b sin² wt, y = b (wt − ½ sin 2wt), ψ = 2b (1 − cos wt)/r, b = g sin α/3w².
+    // The effective mass of a thin disk is m + I/r² = 3m/2: x = b sin² wt, y = b (wt − ½ sin 2wt), ψ = 2b (1 − cos
+    // wt)/r, b = g sin α/3w².
     let b = g * alpha.sin() / (3.0 * w * w);
     let angle = w * end;
     let exact = [
@@ -64,12 +67,12 @@ pub fn coin() -> Outcome {
 
     let vakonomic = VakonomicCoin { m, r, g, alpha };
     let start = vakonomic.state([0.0; 6], [0.0, 0.0, w, 0.0, 0.0, 0.0]);
-    // Its heading is driven by large multipliers, and swings fast.
+    // Large multipliers drive the heading, which oscillates fast: the steps are short.
     let other = Run::of(&vakonomic, Mixed::<6>, 0.002, start, end)?;
     let apart = other.error(&exact[..2]);
     assert!(
         apart > 0.01,
-        "the vakonomic path is that of the coin: {apart:e} m"
+        "the vakonomic path should differ from that of the coin, but only by {apart:e} m"
     );
 
     let across = |x: f64, y: f64| (y, -x);
@@ -90,8 +93,8 @@ pub fn coin() -> Outcome {
         )
         .shots(run.samples(41)?.iter().map(disk))
         .to_svg()?;
-    let text = "Two equations for velocities that no equation for positions can replace. Varying L + μ·Ψ alone gives other \
-                equations, \"vakonomic\" ones, whose motion depends on multipliers at the start (here zero) and is not that of a coin.";
+    let text = "The two constraints on velocities cannot be replaced by constraints on positions. Varying L + μ·Ψ alone gives other \
+                equations, called \"vakonomic\", whose motion depends on initial values of the multipliers (here zero) and is not that of a coin.";
     Ok(Scene::new("A rolling coin", text).row(row).picture(
         "coin",
         picture,
@@ -101,7 +104,8 @@ pub fn coin() -> Outcome {
     ))
 }
 
-/// A thin uniform disk on a level plane: contact point (x, y), heading, lean from the vertical to the left, spin; SI units.
+/// A thin uniform disk on a level plane: contact point (x, y), heading, lean to the left from the vertical, and spin
+/// angle; SI units.
 #[dynamics(
     coordinates(x, y, heading, lean, spin),
     let cx = x - r*sin(lean)*sin(heading),
@@ -120,12 +124,12 @@ struct Disk {
 }
 
 impl Disk {
-    /// Rolling at this speed, with a small rate of leaning.
+    /// The state of rolling straight at this speed, with a small rate of leaning.
     fn start(&self, speed: f64, leaning: f64) -> State<5> {
         self.state([0.0; 5], [speed, 0.0, 0.0, leaning, speed / self.r])
     }
 
-    /// The rim in space.
+    /// The points of the rim in space.
     fn rim(&self, q: &[f64; 5]) -> Vec<[f64; 3]> {
         let [x, y, heading, lean, _] = *q;
         let (sin, cos) = heading.sin_cos();
@@ -147,7 +151,7 @@ pub fn disk() -> Outcome {
         g: 9.81,
     };
     let limit = (model.g * model.r / 3.0).sqrt();
-    // Just above the speed below which a rolling disk falls.
+    // Just above the critical speed, below which a disk that rolls straight falls over.
     let start = model.start(1.1 * limit, 0.9);
     let run = Run::of(&model, Mixed::<6>, 0.01, start, 4.0)?;
     let finer = Run::of(&model, Mixed::<8>, 0.005, start, 4.0)?;
@@ -156,7 +160,7 @@ pub fn disk() -> Outcome {
     let found = critical_speed(&model)?;
     assert!(
         (found / limit - 1.0).abs() < 1e-4,
-        "{found} m/s for {limit}"
+        "critical speed {found} m/s instead of {limit} m/s"
     );
 
     let rim = |q: &[f64; 5]| {
@@ -171,9 +175,9 @@ pub fn disk() -> Outcome {
         )
         .shots(run.samples(21)?.iter().map(rim))
         .to_svg()?;
-    let text = "A hoop or disk does not fall while it rolls fast enough: it steers into its fall. Rolling straight is stable above \
+    let text = "A disk does not fall over while it rolls fast enough, since it steers into its fall. Rolling straight is stable above \
                 v² = gr/3.";
-    let caption = "Rolling at 1.1 times the critical speed, pushed to the side: it weaves. Seen from the right, the front and above.";
+    let caption = "Rolling at 1.1 times the critical speed, pushed to the side: it wobbles along its path. Seen from the right, the front and above.";
     let text_found = format!(
         "From the transition matrix on the constraints the critical speed is {found:.6} m/s; √(gr/3) = {limit:.6} m/s."
     );
@@ -183,10 +187,12 @@ pub fn disk() -> Outcome {
     Ok(scene.picture("disk", picture, caption))
 }
 
-/// The speed at which straight rolling changes its stability, by bisection on the spectral radius of a step.
+/// The speed at which rolling straight changes its stability, by bisection on the spectral radius of one step.
 ///
-/// Curves of any radius are neutral motions: the multiplier 1 has a Jordan block of three (lean, heading, place), and its computed modulus is off by
-/// a cube root of round-off. Growth counts from 10⁻⁴ a step; by σ² ∝ v_c² − v² that moves the speed by some 10⁻⁶.
+/// Rolling along circles of any radius is a neutral motion, so that the multiplier 1 has a Jordan block of size three
+/// (lean, heading, position), and its computed modulus has an error of about the cube root of the rounding unit.
+/// Therefore only a growth of more than 10⁻⁴ per step counts as unstable; since σ² ∝ v_c² − v², that changes the speed
+/// by about 10⁻⁶.
 fn critical_speed(model: &Disk) -> Result<f64, Box<dyn Error>> {
     let (mut falls, mut rolls) = (0.5, 3.0);
     for _ in 0..40 {

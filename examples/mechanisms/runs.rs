@@ -20,7 +20,7 @@ pub const HEADER: [&str; 10] = [
 ];
 const WIDTHS: [usize; 10] = [22, 21, 6, 6, 8, 9, 8, 8, 24, 9];
 
-/// The cells of a row under each other's, for the terminal.
+/// The cells of a row as a line with aligned columns, for the terminal.
 pub fn line(cells: [&str; 10]) -> String {
     let padded = cells
         .iter()
@@ -29,7 +29,7 @@ pub fn line(cells: [&str; 10]) -> String {
     padded.collect::<Vec<_>>().join(" ").trim_end().to_owned()
 }
 
-/// A part of the page with the rows of its runs, and its pictures by the names of their files.
+/// A part of the page with the rows of its runs, and its pictures with the names of their files.
 pub struct Scene {
     pub rows: Vec<[String; 10]>,
     pub section: Section,
@@ -72,7 +72,7 @@ pub struct Run<const N: usize> {
 }
 
 impl<const N: usize> Run<N> {
-    /// From the coordinates and velocities `start` at time 0 to `end`.
+    /// Runs from the coordinates and velocities `start` at time 0 to `end`.
     pub fn of<M: Model<N>>(
         model: &M,
         element: impl Into<Element>,
@@ -94,18 +94,18 @@ impl<const N: usize> Run<N> {
         })
     }
 
-    /// max |q − reference| at the end, over the coordinates for which there is a reference.
+    /// max |q − reference| at the end, over the coordinates for which there is a reference value.
     pub fn error(&self, reference: &[f64]) -> f64 {
         distance(&self.motion.last().q, reference)
     }
 
-    /// The row of the table; `conserved` where the model conserves its energy.
+    /// The row of the table.
     ///
     /// # Panics
-    /// Where a constraint does not hold, or the motion is not that which it is compared with.
+    /// If a constraint is violated, or if the motion differs from the one it is compared with.
     pub fn row(&self, scene: &str, conserved: Energy, error: f64, against: &str) -> [String; 10] {
         let residual = self.motion.constraint_residual();
-        // Elements of order two are here for comparison.
+        // Elements of order two are included for comparison only: their error may be large.
         let allowed = if self.element.order() > 2 { 1e-5 } else { 1e-3 };
         assert!(
             residual.position < 1e-12 && error < allowed,
@@ -130,12 +130,12 @@ impl<const N: usize> Run<N> {
         ]
     }
 
-    /// The coordinates at `count` equally spaced times, the start and the end among them.
+    /// The coordinates at `count` equally spaced times, including the start and the end.
     pub fn samples(&self, count: usize) -> Result<Vec<[f64; N]>, AtError> {
         self.samples_until(self.motion.last().t, count)
     }
 
-    /// The same for a part of the motion, from its start.
+    /// The same for a part of the motion, from its start to a given time.
     pub fn samples_until(&self, end: f64, count: usize) -> Result<Vec<[f64; N]>, AtError> {
         let last = count.saturating_sub(1).max(1);
         let time = |k: usize| {
@@ -149,14 +149,14 @@ impl<const N: usize> Run<N> {
         nodes.collect()
     }
 
-    /// The time of the first node whose coordinates are so.
+    /// The time of the first node whose coordinates satisfy a condition.
     pub fn first(&self, condition: impl Fn(&[f64; N]) -> bool) -> Option<f64> {
         let mut nodes = self.motion.states().iter();
         nodes.find(|node| condition(&node.q)).map(|node| node.t)
     }
 }
 
-/// The size of a residual; models without holonomic constraints have none at all.
+/// The size of a residual; exactly zero for models without holonomic constraints.
 fn power(residual: f64) -> String {
     if residual == 0.0 {
         "0".to_owned()
@@ -165,16 +165,17 @@ fn power(residual: f64) -> String {
     }
 }
 
-/// What the energy of a model ought to do.
+/// What the energy of the exact motion does.
 #[derive(Clone, Copy)]
 pub enum Energy {
-    /// Stay.
+    /// It is constant.
     Conserved,
-    /// Change: something moves the mechanism.
+    /// It changes, because something drives the mechanism.
     Driven,
 }
 
-/// max |a − b| over the entries that both have; NaN if one is, which is the largest by `total_cmp`, or if there are none.
+/// max |a − b| over the entries that both have. NaN if one of them is (`total_cmp` treats it as the largest number), or
+/// if there are none.
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());
     apart.max_by(f64::total_cmp).unwrap_or(f64::NAN)

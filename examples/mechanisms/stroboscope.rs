@@ -1,18 +1,19 @@
-//! Pictures of a motion: the mechanism at equally spaced times in fading colour, the paths of its points, one scale for both axes.
+//! Stroboscopic pictures of a motion: the mechanism at equally spaced times, the older the paler, and the paths of its
+//! points, with the same scale on both axes.
 
 use std::fmt::Write;
 use tfe::charts::Colour;
 
 pub type Point = (f64, f64);
 
-/// A piece of a mechanism.
+/// A part of a mechanism.
 #[derive(Clone, Debug)]
 pub enum Part {
     /// A rod, or any open line.
     Line(Vec<Point>),
     /// A closed line, lightly filled: a disk, a frame.
     Outline(Vec<Point>),
-    /// A point mass, or a joint.
+    /// A point mass or a joint.
     Mass(Point),
     /// A point that is fixed to the ground.
     Pivot(Point),
@@ -23,7 +24,7 @@ impl Part {
         Self::Line(vec![a, b])
     }
 
-    /// A rectangle about a point, its length at an angle from the horizontal.
+    /// A rectangle centred at a point, with its long side at an angle from the horizontal.
     pub fn block((x, y): Point, angle: f64, length: f64, width: f64) -> Self {
         let (sin, cos) = angle.sin_cos();
         let corner = |(along, aside): Point| {
@@ -42,13 +43,13 @@ impl Part {
     }
 }
 
-/// Where a point of space is seen: from the right, the front and above.
+/// The projection of a point of space: seen from the right, the front and above.
 pub fn seen([x, y, z]: [f64; 3]) -> Point {
     let (across, depth) = (
         0.9 * x + 0.435_889_894_354_067_4 * y,
         0.9 * y - 0.435_889_894_354_067_4 * x,
     );
-    // Elevation: sin 0.35, cos 0.94.
+    // An elevation with sine 0.35 and cosine 0.94.
     (across, 0.936_749_691_753_440_6 * z + 0.35 * depth)
 }
 
@@ -58,7 +59,7 @@ struct Path {
     is_dashed: bool,
 }
 
-/// A picture to be.
+/// A picture that is being put together.
 pub struct Stroboscope {
     title: String,
     axes: [String; 2],
@@ -67,12 +68,12 @@ pub struct Stroboscope {
     shots: Vec<Vec<Part>>,
 }
 
-/// Outside of the frame, in pixels.
+/// The space outside the frame, in pixels.
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 18.0;
 const TOP: f64 = 58.0;
 const BOTTOM: f64 = 46.0;
-/// The largest frame, in pixels.
+/// The largest size of the frame, in pixels.
 const WIDTH: f64 = 680.0;
 const HEIGHT: f64 = 520.0;
 const SHOTS: Colour = Colour(30, 64, 110);
@@ -88,18 +89,18 @@ impl Stroboscope {
         }
     }
 
-    /// What does not move.
+    /// Adds parts that do not move.
     pub fn ground(mut self, parts: impl IntoIterator<Item = Part>) -> Self {
         self.ground.extend(parts);
         self
     }
 
-    /// The path of a point.
+    /// Adds the path of a point.
     pub fn path(self, name: &str, points: impl IntoIterator<Item = Point>) -> Self {
         self.with_path(name, points, false)
     }
 
-    /// Another path for comparison.
+    /// Adds another path, for comparison, as a dashed line.
     pub fn dashed(self, name: &str, points: impl IntoIterator<Item = Point>) -> Self {
         self.with_path(name, points, true)
     }
@@ -118,7 +119,7 @@ impl Stroboscope {
         self
     }
 
-    /// The mechanism at successive times, the oldest the palest.
+    /// Adds the mechanism at successive times; the oldest is the palest.
     pub fn shots(mut self, shots: impl IntoIterator<Item = Vec<Part>>) -> Self {
         self.shots.extend(shots);
         self
@@ -286,9 +287,9 @@ fn draw(
     }
 }
 
-/// From coordinates to pixels, by one scale.
+/// The map from coordinates to pixels, with one scale for both axes.
 struct View {
-    /// The least and the largest coordinate within the frame.
+    /// The smallest and the largest coordinate within the frame.
     x: (f64, f64),
     y: (f64, f64),
     /// The frame, in pixels.
@@ -307,7 +308,7 @@ impl View {
         if !(low.0 <= high.0) {
             (low, high) = ((0.0, 0.0), (1.0, 1.0));
         }
-        // A line is given some width, everything a margin.
+        // A horizontal or vertical line gets some width, and everything gets a margin.
         let size = (high.0 - low.0).max(high.1 - low.1).max(f64::MIN_POSITIVE);
         let widened = |low: f64, high: f64| {
             let (middle, half) = (
@@ -342,7 +343,7 @@ impl View {
             .join(" ")
     }
 
-    /// Round numbers 60 pixels apart or more; the same distance on both axes.
+    /// Round numbers at least 60 pixels apart, with the same spacing on both axes.
     fn ticks(&self, (low, high): (f64, f64), pixels: f64) -> impl Iterator<Item = f64> + use<> {
         let rough = 60.0 * (high - low) / pixels;
         let power = 10.0_f64.powf(rough.log10().floor());
@@ -356,10 +357,10 @@ impl View {
     }
 }
 
-/// A number of the axis, without the noise of its last digits.
+/// A number as a label of an axis, without rounding errors in its last digits.
 fn label(value: f64) -> String {
     let rounded = (value * 1e6).round() / 1e6;
-    // Not "-0".
+    // Adding zero avoids "-0".
     format!("{}", rounded + 0.0).replace('-', "−")
 }
 
