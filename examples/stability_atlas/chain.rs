@@ -1,4 +1,5 @@
-//! A chain of alternating soft and stiff springs (Fermi, Pasta, Ulam) stepped through the resonances of step and stiff frequency.
+//! A chain of alternating soft and stiff springs (a modified Fermi–Pasta–Ulam chain), with step sizes near resonances
+//! with the stiff frequency.
 
 use crate::{Outcome, Scene, grid};
 use rayon::prelude::*;
@@ -6,7 +7,8 @@ use std::error::Error;
 use tfe::charts::{Axis, Chart, Scale, Section};
 use tfe::prelude::*;
 
-/// m = 3 stiff springs of frequency ω, joined by soft quartic ones; a and b are the middle and the extension of each stiff spring:
+/// m = 3 stiff springs of frequency ω, joined by soft quartic ones; aᵢ is the position of the middle of each stiff
+/// spring, and bᵢ its extension:
 ///
 /// ```text
 /// H = ½ Σ (ȧᵢ² + ḃᵢ²) + ½ω² Σ bᵢ² + ¼ [ (a₁ − b₁)⁴ + Σ_{i<m} (aᵢ₊₁ − bᵢ₊₁ − aᵢ − bᵢ)⁴ + (aₘ + bₘ)⁴ ]
@@ -50,11 +52,11 @@ pub fn scene() -> Outcome {
     let failed: usize = sweeps.iter().map(|sweep| sweep.failed).sum();
     let runs: usize = sweeps.iter().map(|sweep| sweep.points.len()).sum();
     let (exchange, ripple) = exchange()?;
-    let section = Section::new("A stiff and soft chain through its resonances")
+    let section = Section::new("A chain of stiff and soft springs through resonances")
         .paragraph(
             "Three stiff springs of frequency ω = 50 between soft quartic ones, 12 states. A \
-             step of hω near π is half a period of the stiff oscillation: there an element \
-             shows whether it can be trusted with steps that do not resolve the stiff springs.",
+             step with hω near π is half a period of the stiff oscillation: it shows whether \
+             an element can be trusted with steps that do not resolve the stiff springs.",
         )
         .figure(
             errors(
@@ -62,7 +64,7 @@ pub fn scene() -> Outcome {
                 &sweeps[..2],
             )?,
             "Each point is the worst energy error of a whole run. Primal: the error grows with \
-             hω, and beyond √12 = 3.46 no run comes to its end. Mixed, the midpoint rule: small \
+             hω, and beyond √12 = 3.46 no run reaches its end. Mixed, the midpoint rule: small \
              at every step.",
         )
         .figure(
@@ -70,8 +72,8 @@ pub fn scene() -> Outcome {
                 "Three nodes: energy error over 200 units of time",
                 &sweeps[2..],
             )?,
-            "Primal: lost in the bubble from √10 = 3.16 to √12, where the stiff springs take \
-             energy from nowhere; usable again behind it. Mixed: only the small marks of steps \
+            "Primal: unstable in the bubble from √10 = 3.16 to √12, where the energy of the \
+             stiff springs grows; usable again beyond it. Mixed: only small peaks at steps \
              that turn the stiff oscillation by a third (hω = 2.14) or half (√12) of a \
              revolution: resonances of the step with the quartic springs.",
         )
@@ -88,8 +90,8 @@ pub fn scene() -> Outcome {
         .figure(
             exchange,
             format!(
-                "What the chain does, with Mixed::<3> at hω = 1: the stiff springs hand their \
-                 energy on, while its sum stays where it is (here between {:.3} and {:.3}): the \
+                "The motion of the chain, with Mixed::<3> at hω = 1: the stiff springs exchange \
+                 energy, while its sum remains nearly constant (here between {:.3} and {:.3}): an \
                  adiabatic invariant of the model.",
                 ripple.0, ripple.1
             ),
@@ -102,7 +104,7 @@ pub fn scene() -> Outcome {
     Ok(Scene { section, key })
 }
 
-/// Runs of one element with many steps.
+/// The runs of one element with many step sizes.
 struct Sweep {
     element: Element,
     /// (hω, worst relative energy error).
@@ -118,7 +120,8 @@ impl Sweep {
             let simulation = Simulation::new(&CHAIN)
                 .element(element)
                 .step(step / CHAIN.omega);
-            // An element far beyond its limit may not be solved any more: no point, but counted.
+            // The equations of an element far beyond its stability limit may have no solution: the point is left out,
+            // and counted.
             let run = simulation.record_every(2).run(start(), 0.0..END);
             (step, run.map_or(f64::NAN, |motion| motion.energy_error()))
         };
@@ -131,7 +134,7 @@ impl Sweep {
         }
     }
 
-    /// The worst energy error of the runs that came to their end.
+    /// The worst energy error of the runs that reached their end.
     fn worst(&self, from: f64, to: f64) -> Option<f64> {
         let inside = self
             .points
@@ -147,7 +150,7 @@ impl Sweep {
         let error = |from, to| {
             let worst = self.worst(from, to);
             worst.map_or_else(
-                || "no run to its end".to_owned(),
+                || "all runs failed".to_owned(),
                 |worst| format!("{worst:.1e}"),
             )
         };
@@ -173,7 +176,7 @@ fn errors(title: &str, sweeps: &[Sweep]) -> Result<String, Box<dyn Error>> {
     Ok(chart.to_svg()?)
 }
 
-/// The energies of the stiff springs over time, and the least and largest of their sum.
+/// The energies of the stiff springs over time, and the smallest and largest value of their sum.
 fn exchange() -> Result<(String, (f64, f64)), Box<dyn Error>> {
     let motion = Simulation::new(&CHAIN)
         .element(Mixed::<3>)

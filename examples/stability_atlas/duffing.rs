@@ -1,4 +1,5 @@
-//! The forced Duffing oscillator: resonance curves with their folds by continuation, the backbone through their peaks, and a period doubling.
+//! The forced Duffing oscillator: resonance curves with folds by continuation, the backbone curve through their peaks,
+//! and a period doubling.
 
 use crate::{Outcome, Scene, grid};
 use nalgebra::Complex;
@@ -21,7 +22,7 @@ struct Duffing {
     omega: f64,
 }
 
-/// The same without force and damping, α = β = 1.
+/// The free oscillator: no force, no damping, α = β = 1.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - x^4/4)]
 struct Free {}
 
@@ -33,7 +34,7 @@ pub fn scene() -> Outcome {
         curves.push((force, resonance(force)?));
     }
     let (backbone, backbone_error) = backbone()?;
-    // Order ten with 40 elements: what iterations leave.
+    // Order ten with 40 elements: the error that remains is that of the iterations.
     assert!(backbone_error < 1e-10, "{backbone_error:e}");
     let wells = Wells::new()?;
     let rows = curves
@@ -42,7 +43,10 @@ pub fn scene() -> Outcome {
     let points: usize = curves.iter().map(|(_, branch)| branch.points().len()).sum();
     let doubling = &wells.doubling.point;
     let passing = critical(&doubling.multipliers, -1.0);
-    assert!((passing + 1.0).norm() < 1e-5, "{passing} passes −1");
+    assert!(
+        (passing + 1.0).norm() < 1e-5,
+        "the multiplier {passing} should be −1 at the doubling"
+    );
     let next = wells.double.events_of(EventKind::PeriodDoubling).next();
     let next = next.map_or_else(String::new, |next| {
         format!(", and doubles again at F = {:.9}", next.point.parameter)
@@ -56,8 +60,8 @@ pub fn scene() -> Outcome {
         .figure(
             resonance_picture(&curves, backbone)?,
             format!(
-                "α = β = 1, δ = 0.1. Between its folds a response is unstable (dashed): over ω \
-                 the oscillator jumps. The backbone, free oscillations of given energy, runs \
+                "α = β = 1, δ = 0.1. Between the folds a response is unstable (dashed): when ω changes, \
+                 the oscillator jumps at a fold. The backbone curve of free oscillations runs \
                  through the peaks; its periods agree with elliptic integrals to \
                  {backbone_error:.1e}. {points} orbits."
             ),
@@ -75,8 +79,8 @@ pub fn scene() -> Outcome {
             wells.picture()?,
             format!(
                 "α = −1, β = 1, δ = 0.3, ω = 1.2: oscillations in one of two wells. At F = \
-                 {:.9} a multiplier passes −1 (here {:.9}): the response of the period of the \
-                 force goes on unstable, one of twice the period takes over{next}.",
+                 {:.9} a multiplier passes −1 (here {:.9}): the response with the period of the \
+                 force becomes unstable and one of twice the period is born{next}.",
                 doubling.parameter, passing.re
             ),
         );
@@ -92,7 +96,7 @@ pub fn scene() -> Outcome {
     Ok(Scene { section, key })
 }
 
-/// The response over ω.
+/// The branch of responses over ω.
 fn resonance(force: f64) -> Result<Branch<Duffing, 1>, Box<dyn Error>> {
     let duffing = Duffing {
         alpha: 1.0,
@@ -116,7 +120,8 @@ fn resonance(force: f64) -> Result<Branch<Duffing, 1>, Box<dyn Error>> {
     Ok(branch)
 }
 
-/// (frequency, amplitude) of free oscillations by their energy, and the largest relative error of a period.
+/// (frequency, amplitude) of free oscillations for a range of energies, and the largest relative error of their
+/// periods.
 fn backbone() -> Result<(Points, f64), Box<dyn Error>> {
     let (mut points, mut errors) = (Vec::new(), Vec::new());
     for amplitude in grid(0.05, 2.9, 58) {
@@ -148,7 +153,8 @@ fn free_period(amplitude: f64) -> f64 {
     TAU / (a * (1.0 + a2).sqrt())
 }
 
-/// The orbits of a branch as (parameter, amplitude), stable or unstable ones, with gaps between them. Events belong to both.
+/// The stable or the unstable orbits of a branch as (parameter, amplitude), with gaps between separate parts. Events
+/// belong to both.
 fn part(branch: &Branch<Duffing, 1>, is_stable: bool) -> Points {
     let mut points = Vec::new();
     for (place, orbit) in branch.points().iter().enumerate() {
@@ -192,7 +198,7 @@ fn resonance_picture(
     Ok(chart.to_svg()?)
 }
 
-/// The multiplier nearest to a value.
+/// The multiplier closest to a value.
 fn critical(multipliers: &[Complex<f64>], value: f64) -> Complex<f64> {
     let distance = |one: &Complex<f64>| (one - value).norm();
     let nearest = multipliers
@@ -215,7 +221,8 @@ fn fold_rows(force: f64, branch: &Branch<Duffing, 1>) -> Vec<[String; 4]> {
     branch.events_of(EventKind::Fold).map(row).collect()
 }
 
-/// Oscillations in one of two wells, over the force: of the period of the force, and of twice that.
+/// Oscillations in one of the two wells over the force: responses with the period of the force, and with twice that
+/// period.
 struct Wells {
     single: Branch<Duffing, 1>,
     double: Branch<Duffing, 1>,
@@ -242,7 +249,7 @@ impl Wells {
             .next()
             .ok_or("no period doubling")?
             .clone();
-        // Just beyond it the response of the force's period is left for the one of twice the period.
+        // Just beyond the doubling: switch from the response with the period of the force to that of twice the period.
         let beyond = Duffing {
             f: doubling.point.parameter + 1e-3,
             ..small
@@ -262,7 +269,7 @@ impl Wells {
         })
     }
 
-    /// Responses of so many periods of the force, over the force.
+    /// Continuation over the force of responses with the given number of periods of the force.
     fn of_period(duffing: &Duffing, periods: f64) -> Continuation<'_, Duffing, 1> {
         Continuation::of(duffing)
             .parameter(|duffing| &mut duffing.f)

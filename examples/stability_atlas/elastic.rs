@@ -1,4 +1,5 @@
-//! The elastic pendulum: a stiff spring that swings. Energy error through the resonances of the step, and the 2 : 1 resonance of the model itself.
+//! The elastic pendulum, a mass that swings on a stiff spring: the energy error near resonances of the step size with
+//! the spring, and the 2 : 1 resonance of the model itself.
 
 use crate::{Outcome, Scene, grid};
 use rayon::prelude::*;
@@ -8,7 +9,7 @@ use tfe::charts::{Axis, Chart, HeatMap, Scale, Section};
 use tfe::prelude::*;
 use tfe::stability::{FloquetError, StabilityMap};
 
-/// Unit mass on a spring of unit length and stiffness k; θ from the downward vertical.
+/// A unit mass on a spring of unit length and stiffness k; θ is measured from the downward vertical.
 #[dynamics(
     coordinates(r, theta),
     lagrangian = (dot(r)^2 + r^2*dot(theta)^2)/2 + g*r*cos(theta) - k/2*(r - 1)^2,
@@ -18,7 +19,7 @@ struct ElasticPendulum {
     k: f64,
 }
 
-/// Small swings about the vertical oscillation r = r_s (1 + a cos τ), r_s = 1 + g/k, τ = √k t:
+/// The linear equation of small swings during the vertical oscillation r = r_s (1 + a cos τ), r_s = 1 + g/k, τ = √k t:
 ///
 /// ```text
 /// (r² θ')' + r θ / ν² = 0 ,     ν = √k / √(g/r_s) ,  r in units of r_s
@@ -52,7 +53,7 @@ pub fn scene() -> Outcome {
     let (map, picture) = resonance()?;
     let orbit = bouncing()?;
     let difference = (orbit.multiplier - orbit.by_map).abs();
-    // Order 14 with 40 elements: what iterations leave.
+    // Order 14 with 40 elements: the error that remains is that of the iterations.
     assert!(
         difference < 1e-9 && orbit.period_error.abs() < 1e-9,
         "{difference:e} {:e}",
@@ -69,16 +70,16 @@ pub fn scene() -> Outcome {
     let section = Section::new("The elastic pendulum")
         .paragraph(
             "A mass on a spring that swings: r is stiff (√k = 50), θ is slow (√g = 1). It \
-             starts at rest from 60°, with the spring a little too long. An element that does \
-             not resolve the spring should leave it alone.",
+             starts at rest from 60°, with a slightly stretched spring. An element whose steps do \
+             not resolve the spring should not excite it.",
         )
         .figure(
             errors(&sweeps)?,
             format!(
-                "The worst energy error of runs over 100 units of time. Primal elements lose \
-                 everything where the spring meets their instability, from √12 on with two \
+                "The worst energy error of runs over 100 units of time. Primal elements are \
+                 unstable if h√k lies in their unstable intervals: from √12 on with two \
                  nodes, from √10 to √12 with three. Mixed elements stay below {bound:.1e} \
-                 everywhere; their small peaks are steps that turn the spring by a whole part \
+                 everywhere; their small peaks are steps in which the spring turns by a simple fraction \
                  of a revolution."
             ),
         )
@@ -93,22 +94,22 @@ pub fn scene() -> Outcome {
         .figure(
             picture,
             format!(
-                "Physics, not method: a pendulum that bounces straight up and down with \
-                 amplitude a begins to swing where its own frequency is half of the spring's, ν \
-                 = 2, the more readily the higher it bounces. Colour: growth of the swing over \
+                "An instability of the model, not of the method: a pendulum that bounces up and down with \
+                 amplitude a begins to swing where its frequency is half of that of the spring, ν \
+                 = 2, over a wider range the higher it bounces. Colour: growth of the swing over \
                  one bounce, zero where bouncing is stable (dark). {:.0} % of the map are \
                  unstable.",
                 100.0 * map.fraction_unstable().unwrap_or(f64::NAN)
             ),
         )
         .paragraph(format!(
-            "One point of the map again with the full model: PeriodicOrbit finds the bouncing \
+            "One point of the map, computed with the full model: PeriodicOrbit finds the bouncing \
              orbit of ν = 2, a = 0.3 by its energy (period {:.12}, √k T/2π − 1 = {:.0e}); its \
-             largest multiplier is {:.12}, the map's method gives {:.12}.",
+             largest multiplier is {:.12}, the map has {:.12}.",
             orbit.period, orbit.period_error, orbit.multiplier, orbit.by_map
         ));
     let key = format!(
-        "worst energy error: {} {}, {} {}; bouncing orbit: multiplier {:.6}, off by \
+        "worst energy error: {} {}, {} {}; bouncing orbit: multiplier {:.6}, error \
          {difference:.0e}",
         sweeps[1].0,
         lost_or(worst(&sweeps[1].1)),
@@ -119,7 +120,7 @@ pub fn scene() -> Outcome {
     Ok(Scene { section, key })
 }
 
-/// (h√k, worst relative energy error) of runs with one element.
+/// (h√k, worst relative energy error) for runs with one element.
 fn sweep(element: Element) -> Vec<(f64, f64)> {
     let count = if cfg!(debug_assertions) { 50 } else { 295 };
     let steps: Vec<f64> = grid(0.1, 5.0, count).collect();
@@ -138,7 +139,7 @@ fn worst(points: &[(f64, f64)]) -> f64 {
     points.iter().map(|point| point.1).fold(0.0, f64::max)
 }
 
-/// An energy error, unless the energy is lost.
+/// An energy error as text, or “over 100” if the run is useless.
 fn lost_or(error: f64) -> String {
     if error < 100.0 {
         format!("{error:.1e}")
@@ -159,7 +160,7 @@ fn errors(sweeps: &[(Element, Vec<(f64, f64)>)]) -> Result<String, Box<dyn Error
     Ok(chart.to_svg()?)
 }
 
-/// The growth of the swing over one bounce.
+/// The growth of a small swing during one period of the bounce.
 fn resonance() -> Result<(StabilityMap<FloquetError>, String), Box<dyn Error>> {
     let (columns, rows) = if cfg!(debug_assertions) {
         (80, 48)
@@ -174,7 +175,7 @@ fn resonance() -> Result<(StabilityMap<FloquetError>, String), Box<dyn Error>> {
     }
     let growth = |i, j| map.value(i, j).map(|radius| radius.max(1.0).ln());
     let picture = HeatMap::new(
-        "Bouncing spring: growth of the swing over one bounce",
+        "Bouncing spring: growth of the swing in one bounce",
         (map.columns(), map.rows()),
         growth,
     )
@@ -193,7 +194,7 @@ struct Bouncing {
     by_map: f64,
 }
 
-/// The orbit of the full model at ν = 2, a = 0.3, by its energy, and its multiplier that is not trivial.
+/// The bouncing orbit of the full model at ν = 2, a = 0.3, found by its energy, and its non-trivial multiplier.
 fn bouncing() -> Result<Bouncing, Box<dyn Error>> {
     // ν² = k r_s/g = (k + g)/g
     let pendulum = ElasticPendulum { g: 1.0, k: 3.0 };

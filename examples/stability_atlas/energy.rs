@@ -1,4 +1,4 @@
-//! The quadratic form that one primal element of the oscillator keeps instead of the energy.
+//! The quadratic form that a primal element of the oscillator conserves instead of the energy.
 
 use crate::oscillator::{transition, unstable};
 use crate::{Outcome, Scene, grid};
@@ -10,26 +10,26 @@ use tfe::stability::TransitionError;
 pub fn scene() -> Outcome {
     let error = against_closed_forms()?;
     let mixed = farthest_from_one()?;
-    // Roundings of the entries, up to 10⁴ times as large beside the poles and zeros.
+    // Rounding errors of the entries, amplified by up to 10⁴ near the poles and zeros.
     assert!(error < 1e-9 && mixed < 1e-9, "{error:e} {mixed:e}");
-    let section = Section::new("The energy that an element keeps")
+    let section = Section::new("The energy that an element conserves")
         .paragraph(
-            "A symplectic element of the oscillator keeps p²/2m + (kₙ/2) q² with a stiffness of \
+            "A symplectic element of the oscillator conserves p²/2m + (kₙ/2) q² with a stiffness of \
              its own, kₙ = −a₁₂/(m a₂₁) from the entries of its transition matrix. While kₙ > 0 \
-             the states of a run lie on an ellipse; where kₙ < 0 they run off along a \
+             the states of a run lie on an ellipse; if kₙ < 0 they diverge along a \
              hyperbola.",
         )
         .figure(
             stiffness(
-                "The stiffness that the primal element keeps",
+                "Effective stiffness of the primal element",
                 0.0..20.0,
                 (-2.0, 3.0),
                 0.0,
             )?,
             format!(
                 "Two nodes: k₂/k = 1 − ρ²/12 falls to zero at √12 — the element locks. With \
-                 more nodes kₙ stays near k for longer and leaves it through poles and zeros in \
-                 pairs: those are the bubbles. Mixed elements keep k itself, to {mixed:.1e}. \
+                 more nodes kₙ remains close to k up to longer steps, and leaves it at pairs of poles and zeros: \
+                 these are the bubbles. Mixed elements conserve the true energy, kₙ = k to {mixed:.1e}. \
                  The curves for 2, 3 and 4 nodes agree with (T-59) to {error:.1e}."
             ),
         )
@@ -47,9 +47,9 @@ pub fn scene() -> Outcome {
         )
         .figure(
             orbits(3, &[1.0, 2.5, 3.0, 3.13, 3.3, 4.0, 6.0, 7.5])?,
-            "Three nodes: the orbits of the steps ρ, all from p = 1, q = 0. The circle belongs \
+            "Three nodes: the orbits for several steps ρ, all from p = 1, q = 0. The circle belongs \
              to ρ → 0. Towards √10 = 3.162 the ellipse collapses, inside the bubble (ρ = 3.3) \
-             it opens into a hyperbola, behind it comes back elongated, and towards √60 = 7.746 \
+             it opens into a hyperbola, beyond it there is an elongated ellipse, which towards √60 = 7.746 \
              grows without bound.",
         );
     let key = format!("kₙ/k by (T-59) to {error:.1e}; mixed: |k/kₙ − 1| ≤ {mixed:.1e}");
@@ -62,7 +62,7 @@ fn kept(element: Element, rho: f64) -> Result<f64, TransitionError> {
     Ok(-a[(0, 1)] / a[(1, 0)])
 }
 
-/// kₙ/k over ρ; a gap at each pole.
+/// kₙ/k over ρ, with a gap at each pole.
 fn stiffness(
     title: &str,
     range: std::ops::Range<f64>,
@@ -98,7 +98,8 @@ fn stiffness(
     Ok(chart.line("mixed, any nodes", one).to_svg()?)
 }
 
-/// The largest relative distance from (T-59), away from the poles; NaN, the largest by `total_cmp`, where one is.
+/// The largest relative difference from (T-59), except near the poles; NaN if one is (`total_cmp` treats it as the
+/// largest number).
 fn against_closed_forms() -> Result<f64, TransitionError> {
     let mut errors: Vec<f64> = Vec::new();
     for rho in grid(0.1, 20.0, 400) {
@@ -120,7 +121,7 @@ fn against_closed_forms() -> Result<f64, TransitionError> {
         .unwrap_or(f64::NAN))
 }
 
-/// The largest |k/kₙ − 1| of mixed elements with 2 to 6 nodes.
+/// The largest |k/kₙ − 1| for mixed elements with 2 to 6 nodes.
 fn farthest_from_one() -> Result<f64, TransitionError> {
     let mut errors: Vec<f64> = Vec::new();
     for rho in grid(0.1, 20.0, 400) {
@@ -149,7 +150,7 @@ fn orbits(nodes: usize, steps: &[f64]) -> Result<String, Box<dyn Error>> {
     Ok(chart.to_svg()?)
 }
 
-/// p² + k q² = 1 as points (q, p).
+/// The curve p² + k q² = 1 as points (q, p).
 fn conic(k: f64) -> Vec<(f64, f64)> {
     let root = k.abs().sqrt();
     if k > 0.0 {

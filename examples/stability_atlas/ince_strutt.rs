@@ -1,4 +1,5 @@
-//! The stability chart of Mathieu's equation (Ince and Strutt): a million points, and its boundaries by root finding.
+//! The stability chart of Mathieu's equation (Ince–Strutt diagram): a million points, and its boundaries by root
+//! finding.
 
 use crate::{Outcome, Scene, grid};
 use nalgebra::DMatrix;
@@ -17,11 +18,11 @@ struct Mathieu {
     q: f64,
 }
 
-/// A million points, where the compiler optimises.
+/// A million points if the program is optimised.
 const SIDE: usize = if cfg!(debug_assertions) { 100 } else { 1000 };
 const ELEMENTS: usize = 12;
 
-/// Characteristic values from eigenvalue problems at 45 digits: a₀, b₁, a₁, b₂, a₂, b₃, a₃, b₄, a₄ at a q.
+/// Characteristic values for several q, from eigenvalue problems with 45 digits: a₀, b₁, a₁, b₂, a₂, b₃, a₃, b₄, a₄.
 const REFERENCE: [(f64, [f64; 9]); 3] = [
     (
         0.5,
@@ -95,21 +96,21 @@ pub fn scene() -> Outcome {
         picture = picture.curve(name, points.iter().copied());
     }
     let (rows, worst) = table()?;
-    // Roundings of the multipliers, which a tongue as narrow as a₄ − b₄ at q = ½ makes 10⁵ times as large.
-    assert!(worst < 1e-6, "a boundary is off by {worst:e}");
+    // Rounding errors of the multipliers, amplified by 10⁵ at a tongue as narrow as b₄ to a₄ at q = ½.
+    assert!(worst < 1e-6, "a boundary has an error of {worst:e}");
     let rate = (SIDE * SIDE) as f64 / seconds;
     let section = Section::new("The chart of Ince and Strutt")
         .paragraph(
-            "A pendulum whose support shakes, a column under a pulsating load, a ship in waves: \
-             small motions obey Mathieu's equation. It is unstable in tongues that grow from a \
+            "A pendulum with an oscillating support, a column under a pulsating load, a ship in waves: \
+             small motions obey Mathieu's equation. It is unstable in tongues that start from a \
              = n², q = 0; their sides are the characteristic values aₙ and bₙ.",
         )
         .figure(
             picture.to_svg()?,
             format!(
                 "Growth over one period of the coefficient, zero where stable (dark). {SIDE} × {SIDE} \
-                 points in {seconds:.1} s, {:.2} million a second: Mixed::<4>, {ELEMENTS} \
-                 elements a period. The curves are roots of the same multipliers in a, for {} \
+                 points in {seconds:.1} s, {:.2} million per second: Mixed::<4>, {ELEMENTS} \
+                 elements per period. The curves are the values of a where the same multipliers pass ±1, for {} \
                  values of q.",
                 rate / 1e6,
                 curves.count
@@ -126,7 +127,7 @@ pub fn scene() -> Outcome {
             rows,
         )
         .paragraph(format!(
-            "Boundaries by unstable_intervals_of over a, with Mixed::<8> and 16 elements a \
+            "Boundaries by unstable_intervals_of over a, with Mixed::<8> and 16 elements per \
              period: the largest error is {worst:.1e}."
         ));
     let key = format!(
@@ -136,7 +137,7 @@ pub fn scene() -> Outcome {
     Ok(Scene { section, key })
 }
 
-/// The ends of the unstable intervals of a, ascending: a₀, b₁, a₁, b₂, … All are above −2q.
+/// The ends of the unstable intervals of a, ascending: a₀, b₁, a₁, b₂, … All of them are above −2q.
 fn boundaries(q: f64, element: Element, end: f64) -> Result<Vec<f64>, Failure> {
     let intervals = unstable_intervals_of(
         |a| monodromy(&Mathieu { a, q }, element),
@@ -145,7 +146,7 @@ fn boundaries(q: f64, element: Element, end: f64) -> Result<Vec<f64>, Failure> {
     let ends = intervals
         .iter()
         .flat_map(|interval| [interval.start, interval.end]);
-    // The first interval begins at the range's own start.
+    // The first interval begins at the start of the range, which is no boundary.
     Ok(ends.skip(1).filter(|a| *a < end).collect())
 }
 
@@ -156,7 +157,7 @@ fn monodromy(model: &Mathieu, element: Element) -> Result<DMatrix<f64>, RunError
     Ok(period.run_linearised(rest, 0.0..PI)?.product())
 }
 
-/// Boundaries as curves (a, q), with gaps between them.
+/// The boundaries as curves (a, q), with gaps between them.
 struct Curves {
     a: Vec<(f64, f64)>,
     b: Vec<(f64, f64)>,
@@ -181,7 +182,7 @@ fn curves() -> Result<Curves, Failure> {
         } else {
             &mut curves.b
         };
-        // All tongues begin at a = n².
+        // Every tongue starts at a = n².
         let order = k.div_ceil(2) as f64;
         curve.push((order * order, 0.0));
         let points = places
@@ -194,7 +195,7 @@ fn curves() -> Result<Curves, Failure> {
     Ok(curves)
 }
 
-/// Every boundary beside its characteristic value, and the largest error.
+/// All boundaries compared with their characteristic values, and the largest error.
 fn table() -> Result<(Vec<[String; 5]>, f64), Failure> {
     let (mut rows, mut worst) = (Vec::new(), 0.0_f64);
     for (q, values) in REFERENCE {

@@ -1,4 +1,4 @@
-//! The time of a periodic orbit over the number of its elements.
+//! The time to compute a periodic orbit over the number of its elements.
 
 use crate::work::VanDerPol;
 use crate::{Outcome, Scene};
@@ -47,9 +47,9 @@ pub fn scene() -> Outcome {
             format!(
                 "From ten elements to ten thousand: the exponent of a straight line through the \
                  points is {all:.3}, and {large:.3} from a hundred elements on, where what a \
-                 solution costs besides no longer counts. The equations of all elements are \
+                 fixed costs no longer matter. The equations of all elements are \
                  eliminated one after the other, and the multipliers come from the factors, so \
-                 that everything is linear in their number."
+                 that the cost is linear in their number."
             ),
         )
         .table(
@@ -108,7 +108,7 @@ impl Cost {
     }
 }
 
-/// The slope of the straight line through (ln elements, ln time) with the least squares.
+/// The slope of the straight line through (ln elements, ln time), by least squares.
 fn exponent(costs: &[Cost]) -> f64 {
     let points: Vec<_> = costs
         .iter()

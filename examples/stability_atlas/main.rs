@@ -1,11 +1,13 @@
-//! A stability atlas: what elements in time do to oscillators, tops, chains and orbits, as charts in one page that needs no other file.
+//! A stability atlas: how finite elements in time treat oscillators, tops, chains and periodic orbits. The charts are
+//! on one page of HTML that needs no other file.
 //!
 //! ```sh
 //! cargo run --release --example stability_atlas            # target/stability_atlas.html
 //! cargo run --release --example stability_atlas -- my.html
 //! ```
 //!
-//! Each module is a scene: its model, what is computed, its charts and tables. A scene that fails ends the program with its error.
+//! A line is printed for each scene, with the time it took and its main result. Each module is a scene: its model, the
+//! computations, its charts and tables. A scene that fails ends the program with its error.
 
 mod chain;
 mod duffing;
@@ -26,7 +28,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use tfe::charts::{Page, Section};
 
-/// A part of the page, and the figure that matters.
+/// A section of the page, and a line with its main result.
 struct Scene {
     section: Section,
     key: String,
@@ -35,7 +37,7 @@ struct Scene {
 type Outcome = Result<Scene, Box<dyn Error>>;
 type Run = fn() -> Outcome;
 
-/// One after the other: those that measure time must have the machine for themselves.
+/// One after the other: scenes that measure times must have the machine for themselves.
 const SCENES: [(&str, Run); 10] = [
     ("radius", radius::scene),
     ("energy", energy::scene),
@@ -74,7 +76,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// `count` numbers from `start` to `end`, equally far from each other.
+/// `count` equally spaced numbers from `start` to `end`.
 fn grid(start: f64, end: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
     let last = count.saturating_sub(1).max(1) as f64;
     (0..count).map(move |k| start + (end - start) * k as f64 / last)

@@ -1,4 +1,4 @@
-//! A helicopter blade that flaps in forward flight, over Lock number and advance ratio.
+//! The flapping of a helicopter blade in forward flight, over Lock number and advance ratio.
 
 use crate::{Outcome, Scene};
 use std::f64::consts::TAU;
@@ -7,7 +7,8 @@ use tfe::charts::{Axis, Class, Colour, HeatMap, Section};
 use tfe::prelude::*;
 use tfe::stability::StabilityMap;
 
-/// A rigid blade about its steady flapping, hinged at the axis; the azimuth is the time, γ the Lock number, μ the advance ratio:
+/// A rigid blade, hinged at the rotor axis, about its steady flapping; the azimuth angle is the time, γ the Lock
+/// number, μ the advance ratio:
 ///
 /// ```text
 /// β̈ + γ/8 (1 + 4/3 μ sin t) β̇ + (1 + γ/8 (4/3 μ cos t + μ² sin 2t)) β = 0
@@ -49,11 +50,11 @@ pub fn scene() -> Outcome {
     let class = |i, j| kinds.value(i, j).map(|kind| kind as usize);
     let section = Section::new("A flapping blade in forward flight")
         .paragraph(
-            "A helicopter blade is damped by the air, periodically in forward flight. Its two \
+            "A helicopter blade is damped by the air; in forward flight the damping is periodic. Its two \
              Floquet multipliers are a pair with |λ| = e^(−πγ/8), or real: the blade then flaps \
              in a whole or half multiple of the rotor speed, one motion damped less, the other \
-             more. The air forces are without reverse flow: beyond an advance ratio of about a \
-             half the map is one of this equation rather than of a helicopter.",
+             more. The model neglects reverse flow: beyond an advance ratio of about one \
+             half, the map describes this equation rather than a helicopter.",
         )
         .figure(
             axes(
@@ -74,7 +75,7 @@ pub fn scene() -> Outcome {
         .figure(
             axes(
                 HeatMap::new(
-                    "Flapping blade: growth rate of the slower motion",
+                    "Flapping blade: growth rate of the less damped motion",
                     size,
                     rate,
                 )
@@ -83,7 +84,7 @@ pub fn scene() -> Outcome {
             )
             .to_svg()?,
             "In hover (μ = 0) σ = −γ/16 until the blade is overdamped at γ = 16. The dark lines \
-             are the borders of locking, where the damping is best shared.",
+             are the borders of locking, where both motions are equally damped.",
         );
     let key = format!(
         "{SIDE} × {SIDE} blades, twice; {unstable:.1} % unstable, none below μ = {onset:.2}"
@@ -95,7 +96,7 @@ fn is_unstable(radius: Option<f64>) -> bool {
     radius.is_some_and(|radius| radius > 1.0)
 }
 
-/// The number of the class of a blade, from the trace and the determinant of its transition matrix over a revolution.
+/// The class of a blade, from the trace and the determinant of its transition matrix over one revolution.
 fn kind(blade: &Blade) -> Result<f64, RunError<1>> {
     let revolution = Simulation::new(blade).element(Mixed::<5>).step(TAU / 24.0);
     let matrix = revolution

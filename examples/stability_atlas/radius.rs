@@ -1,4 +1,4 @@
-//! Figure 1 of the paper: the spectral radius of one element of the undamped oscillator, over ρ = ωh.
+//! Figure 1 of the paper: the spectral radius of one element of the undamped oscillator over ρ = ωh.
 
 use crate::oscillator::{transition, unstable};
 use crate::{Outcome, Scene, grid};
@@ -18,10 +18,13 @@ pub fn scene() -> Outcome {
     let lobatto = Family::of("Lobatto quadrature", |n| Element::primal(n).lobatto())?;
     let (rows, worst) = compare(&full);
     let (deviation, most) = unit_circle()?;
-    assert!(worst < 1e-9, "an end is off by {worst:e}");
+    assert!(
+        worst < 1e-9,
+        "an end of an interval has an error of {worst:e}"
+    );
     let section = Section::new("Spectral radius of the oscillator")
         .paragraph(
-            "One element of length h carries the state (p, q) of an undamped oscillator over ρ \
+            "One element of length h advances the state (p, q) of an undamped oscillator by ρ \
              = ωh. Its amplitude is multiplied by the spectral radius of the transition matrix: \
              one is right, more is an instability of the method, less is numerical damping. At \
              ρ = 2π an element is a period long.",
@@ -34,9 +37,9 @@ pub fn scene() -> Outcome {
         )
         .figure(
             full.growth()?,
-            "The same growth on a logarithmic scale. At ρ = π five nodes are left with 4·10⁻⁴ \
-             over an interval of 0.0009, six with 10⁻⁵ over 0.00002: no grid of radii finds \
-             these, root finding does.",
+            "The same growth on a logarithmic scale. Near ρ = π, five nodes have a growth of 4·10⁻⁴ \
+             in an interval of length 0.0009, and six nodes 10⁻⁵ in one of 0.00002. A grid would miss \
+             these; root finding does not.",
         )
         .table(
             [
@@ -53,7 +56,7 @@ pub fn scene() -> Outcome {
         .figure(
             lobatto.radii()?,
             "Primal elements with Lobatto quadrature; two nodes are the leapfrog method with \
-             its limit ρ = 2. Cheaper forces, but every limit is nearer and every bubble wider \
+             its limit ρ = 2. The forces cost less, but every limit is lower and every bubble wider \
              than with full quadrature.",
         )
         .table(
@@ -70,17 +73,17 @@ pub fn scene() -> Outcome {
             deviation,
             format!(
                 "Primal with reduced quadrature (the same matrix as Mixed), Mixed and \
-                 EnergyConserving have radius one for every step. What is left is rounding: at \
+                 EnergyConserving have radius one for every step. The rest is rounding: at \
                  most {most:.1e} for 2 to 6 nodes up to ρ = {END}."
             ),
         )
         .figure(
             radau()?,
-            "Radau elements damp what they do not resolve and leave alone what they do: with \
-             six nodes up to five radians, with two hardly one.",
+            "Radau elements damp oscillations that they do not resolve, and hardly those that they resolve: with \
+             six nodes up to five radians per element, with two barely one.",
         );
     let key = format!(
-        "bubbles at their closed forms to {worst:.1e}; |radius − 1| of mixed elements ≤ \
+        "ends of bubbles agree with closed forms to {worst:.1e}; |radius − 1| of mixed elements ≤ \
          {most:.1e}"
     );
     Ok(Scene { section, key })
@@ -88,7 +91,7 @@ pub fn scene() -> Outcome {
 
 type WithIntervals = (Element, Vec<UnstableInterval>);
 
-/// Elements of 2 to 6 nodes with their unstable intervals.
+/// Elements of one family with 2 to 6 nodes, and their unstable intervals.
 struct Family {
     name: &'static str,
     elements: Vec<WithIntervals>,
@@ -101,7 +104,7 @@ impl Family {
         Ok(Self { name, elements })
     }
 
-    /// ρ(A), with the points crowded where it leaves one.
+    /// The spectral radius ρ(A), with points concentrated where it departs from one.
     fn radii(&self) -> Result<String, Box<dyn Error>> {
         let mut chart = Chart::new(format!("Primal, {}: spectral radius", self.name))
             .x(Axis::new("ρ = ωh").range(0.0..20.0))
@@ -120,7 +123,7 @@ impl Family {
         Ok(chart.to_svg()?)
     }
 
-    /// ρ(A) − 1 inside the unstable intervals; gaps between them.
+    /// ρ(A) − 1 inside the unstable intervals, with gaps between them.
     fn growth(&self) -> Result<String, Box<dyn Error>> {
         let mut chart = Chart::new(format!("Primal, {}: growth per element", self.name))
             .x(Axis::new("ρ = ωh").range(0.0..20.0))
@@ -138,7 +141,7 @@ impl Family {
         Ok(chart.to_svg()?)
     }
 
-    /// Limits and widest bubbles of two families.
+    /// The limits and the widest bubbles of two families.
     fn beside(&self, other: &Self) -> Vec<Vec<String>> {
         let limit = |intervals: &[UnstableInterval]| {
             let last = intervals.last().filter(|last| last.end == END);
@@ -165,11 +168,11 @@ impl Family {
     }
 }
 
-/// The radius at points that crowd at the ends of an interval, where it rises like a square root.
+/// The radius at points concentrated at the ends of an interval, where it rises as a square root.
 fn inside(element: Element, interval: &UnstableInterval) -> Result<Points, TransitionError> {
     let (start, end) = (interval.start, interval.end);
     let at = |k: i32| {
-        // Up to 10⁻¹¹ of the length from the ends.
+        // As close as 10⁻¹¹ of the length to the ends.
         let exponent = f64::from(k) / 10.0;
         (start + end) / 2.0 + (end - start) / 2.0 * exponent.tanh()
     };
@@ -177,19 +180,19 @@ fn inside(element: Element, interval: &UnstableInterval) -> Result<Points, Trans
     (-130..=130).map(at).map(point).collect()
 }
 
-/// |ρ(A) − 1| of the elements that are stable for every step, and its maximum.
+/// |ρ(A) − 1| of the elements that are stable for every step size, and its maximum.
 fn unit_circle() -> Result<(String, f64), Box<dyn Error>> {
     let families: [(&str, OfNodes); 3] = [
         ("primal, reduced", |n| Element::primal(n).reduced()),
         ("mixed", Element::mixed),
         ("energy-conserving", Element::energy_conserving),
     ];
-    let mut chart = Chart::new("Reduced primal, mixed, energy-conserving: radius one")
+    let mut chart = Chart::new("Reduced primal, mixed, energy-conserving: radius 1")
         .x(Axis::new("ρ = ωh").range(0.0..END))
         .y(Axis::new("|spectral radius − 1| / ε").range(0.0..60.0));
     let mut most: f64 = 0.0;
     for (name, element) in families {
-        // The worst of all numbers of nodes.
+        // The worst over all numbers of nodes.
         let mut points: Points = grid(0.05, END, 300).map(|rho| (rho, 0.0)).collect();
         for (rho, deviation) in &mut points {
             for nodes in NODES {
@@ -206,7 +209,7 @@ fn unit_circle() -> Result<(String, f64), Box<dyn Error>> {
 }
 
 fn radau() -> Result<String, Box<dyn Error>> {
-    let mut chart = Chart::new("Radau: numerical damping of what is not resolved")
+    let mut chart = Chart::new("Radau: numerical damping of unresolved oscillations")
         .x(Axis::new("ρ = ωh").range(0.0..END))
         .y(Axis::new("spectral radius").range(0.0..1.05));
     for nodes in NODES {
@@ -222,7 +225,7 @@ fn radau() -> Result<String, Box<dyn Error>> {
     Ok(chart.to_svg()?)
 }
 
-/// An end of an unstable interval in closed form: a zero of a polynomial in ρ² of (T-57).
+/// A closed form for an end of an unstable interval: a zero of a polynomial in ρ² of (T-57).
 struct Closed {
     text: &'static str,
     square: f64,
@@ -245,7 +248,7 @@ impl Closed {
         ]
     }
 
-    /// The closed form nearest to an end.
+    /// The closed form closest to an end.
     fn nearest(all: &[Self], end: f64) -> Option<(&'static str, f64)> {
         let error = |closed: &Self| (closed.text, (end / closed.square.sqrt() - 1.0).abs());
         let errors = all.iter().map(error);
@@ -255,7 +258,7 @@ impl Closed {
     }
 }
 
-/// Every interval that was found beside the closed forms of its ends, and the largest relative error.
+/// All intervals found, compared with the closed forms of their ends, and the largest relative error.
 fn compare(family: &Family) -> (Vec<Vec<String>>, f64) {
     let all = Closed::all();
     let (mut rows, mut worst) = (Vec::new(), 0.0_f64);
@@ -277,7 +280,7 @@ fn compare(family: &Family) -> (Vec<Vec<String>>, f64) {
                 .map(|(_, error)| *error)
                 .reduce(f64::max);
             worst = worst.max(error.unwrap_or(0.0));
-            // Those of up to four nodes all have one.
+            // For up to four nodes, all ends have a closed form.
             assert!(
                 element.nodes() > 4 || found.iter().all(Option::is_some),
                 "{element}: no closed form from {} to {}",

@@ -1,4 +1,4 @@
-//! The speed at which an upright top becomes stable, as the elements see it.
+//! The speed at which an upright top becomes stable: the exact one, and that of the discretised equations.
 
 use crate::{Outcome, Scene, grid};
 use nalgebra::DMatrix;
@@ -34,17 +34,17 @@ const fn spinning_at(omega: f64) -> Top {
     }
 }
 
-/// (Ω/Ω_c)² over σ.
+/// (Ω/Ω_c)² as a function of σ.
 type ClosedForm = fn(f64) -> f64;
 
-/// The speeds at which upright is stable, as an element sees it, over the step h√(mgd/J_t).
+/// The limit of stability of the discretised upright top, as a speed over the step h√(mgd/J_t).
 struct Curve {
     name: &'static str,
     element: Element,
     closed: Option<ClosedForm>,
-    /// (h, limit): unstable below.
+    /// (h, limit): unstable below the limit.
     limits: Vec<(f64, f64)>,
-    /// (h, speed): where further unstable intervals begin and end.
+    /// (h, speed): the ends of further unstable intervals.
     bands: Vec<(f64, f64)>,
 }
 
@@ -76,26 +76,26 @@ pub fn scene() -> Outcome {
     ];
     let errors = curves.iter().filter_map(Curve::error);
     let worst = errors.max_by(f64::total_cmp).ok_or("no closed form")?;
-    assert!(worst < 1e-9, "a limit speed is off by {worst:e}");
-    let section = Section::new("The spinning top: from which speed on is upright stable?")
+    assert!(worst < 1e-9, "a limit speed has an error of {worst:e}");
+    let section = Section::new("The spinning top: from which speed on is it stable?")
         .paragraph(
-            "A top stands upright above Ω_c = (2/J_a)√(mgd J_t). An element with a stiffness of \
-             its own moves that limit. The limits below are found by root finding over Ω, one \
-             for each step.",
+            "A top stands upright in a stable way above Ω_c = (2/J_a)√(mgd J_t). An element with a stiffness of \
+             its own changes that limit. The limits below are found by root finding over Ω, one \
+             for each step size.",
         )
         .figure(
             limits(&curves)?,
-            "Dashed: the closed forms (T-87), (T-88); markers: found. With two primal nodes the \
+            "Dashed: the closed forms (T-87), (T-88); markers: found by root finding. With two primal nodes the \
              top seems to need twice Ω_c at h√(mgd/J_t) = 6, with three 1.18 Ω_c; reduced and \
              mixed elements have the exact limit at every step. Four primal nodes have, \
              besides, a band of instability 0.02 wide far above the limit, where two \
-             multipliers of the element collide; the top itself is stable there. Radau's element \
-             damps: below Ω_c it lets the top seem stable where the damping wins.",
+             multipliers of the element collide; the top itself is stable there. Radau elements \
+             have numerical damping, which makes the top seem stable at some speeds below Ω_c.",
         )
         .figure(
             deviations(&curves)?,
-            "How far the limit is from Ω_c. Slopes 2, 4 and 6: the orders of the elements. What \
-             is left of reduced and mixed elements is rounding.",
+            "The relative error of the limit. Slopes of 2, 4 and 6 are the orders of the elements. The \
+             errors of reduced and mixed elements are rounding.",
         )
         .table(
             [
@@ -106,7 +106,7 @@ pub fn scene() -> Outcome {
             ],
             curves.iter().map(Curve::row),
         );
-    let key = format!("limit speeds at their closed forms to {worst:.1e}");
+    let key = format!("limit speeds agree with closed forms to {worst:.1e}");
     Ok(Scene { section, key })
 }
 
@@ -127,7 +127,7 @@ impl Curve {
         for h in grid(LONGEST / STEPS as f64, LONGEST, STEPS) {
             let intervals = unstable_intervals_of(|omega| upright(element, omega, h), 0.1..2.5)?;
             let Some((below, bands)) = intervals.split_first() else {
-                // The damping of Radau's elements hides the instability of the top itself.
+                // The damping of Radau elements hides the instability of the top itself.
                 if element.family() == Family::Radau {
                     continue;
                 }
@@ -147,7 +147,7 @@ impl Curve {
         self.closed.map(|closed| closed(h * h).sqrt())
     }
 
-    /// The largest relative distance from the closed form.
+    /// The largest relative difference from the closed form.
     fn error(&self) -> Option<f64> {
         let error = |(h, limit): &(f64, f64)| Some((limit / self.expected(*h)? - 1.0).abs());
         let errors = self.limits.iter().filter_map(error);
@@ -168,7 +168,7 @@ impl Curve {
     }
 }
 
-/// The transition matrix about the upright position, spinning at Ω.
+/// The transition matrix for small tilts of the upright top that spins at Ω.
 fn upright(element: Element, omega: f64, h: f64) -> Result<DMatrix<f64>, TransitionError> {
     let top = spinning_at(omega);
     let upright = top.state([0.0; 2], [0.0; 2]);
@@ -194,7 +194,7 @@ fn limits(curves: &[Curve]) -> Result<String, Box<dyn Error>> {
 }
 
 fn deviations(curves: &[Curve]) -> Result<String, Box<dyn Error>> {
-    let mut chart = Chart::new("Limit speed: distance from the exact one")
+    let mut chart = Chart::new("Limit speed: relative error")
         .x(Axis::new("h √(mgd/J_t)")
             .scale(Scale::Logarithmic)
             .range(0.19..6.2))

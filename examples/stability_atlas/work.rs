@@ -1,4 +1,4 @@
-//! Time against accuracy: periodic orbits with their Floquet multipliers.
+//! Time against accuracy for periodic orbits and their Floquet multipliers.
 
 use crate::{Outcome, Scene};
 use nalgebra::Complex;
@@ -25,7 +25,7 @@ struct Duffing {
     omega: f64,
 }
 
-/// A rigid flapping blade in forward flight; the azimuth is the time.
+/// A rigid flapping blade in forward flight; the azimuth angle is the time.
 #[dynamics(
     coordinates(b),
     let aero = lock/8,
@@ -40,7 +40,7 @@ struct Blade {
     lam: f64,
 }
 
-/// Reference multipliers, from shooting with 60 digits.
+/// Reference multipliers, by shooting with 60 digits.
 const VAN_DER_POL: [Complex<f64>; 2] = [
     Complex::new(1.0, 0.0),
     Complex::new(0.0008596950636038052, 0.0),
@@ -53,7 +53,7 @@ const fn pair(re: f64, im: f64) -> [Complex<f64>; 2] {
 }
 
 const ELEMENTS: [usize; 9] = [3, 5, 7, 10, 15, 20, 40, 80, 160];
-// Times of a program that was not optimised say little.
+// Without optimisation, times are not meaningful: one repetition is enough.
 const REPETITIONS: usize = if cfg!(debug_assertions) { 1 } else { 15 };
 const TARGET: f64 = 1e-12;
 
@@ -105,7 +105,7 @@ pub fn scene() -> Outcome {
     }
     let mut section = Section::new("Time against accuracy").paragraph(
         "A periodic orbit and its Floquet multipliers, from a rough guess (a circle, or rest) \
-         to the solution: the time of everything, on one processor, median of several \
+         to the solution: the time of all computations, on one processor, as the median of several \
          solutions. The error is that of the multipliers, relative to the largest of them, \
          against references of 20 digits.",
     );
@@ -139,7 +139,7 @@ fn limit_cycle(model: &VanDerPol, element: Element, elements: usize) -> Multipli
     Ok(orbit.multipliers().to_vec())
 }
 
-/// One setting of one problem.
+/// One combination of element and mesh for one problem.
 #[derive(Clone, Copy)]
 struct Point {
     elements: usize,
@@ -169,7 +169,7 @@ impl Problem {
             let element = Element::mixed(nodes);
             let mut points = Vec::new();
             for elements in ELEMENTS {
-                // A mesh too coarse for the guess is a point less, and counted.
+                // No solution because the mesh is too coarse for the guess: the point is left out, and counted.
                 let Ok(multipliers) = solve(element, elements) else {
                     problem.failed += 1;
                     continue;
@@ -186,7 +186,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// The fastest setting that meets the target.
+    /// The fastest combination that reaches the target.
     fn fastest(&self) -> Option<(Element, Point)> {
         let all = self
             .curves
@@ -244,7 +244,7 @@ impl Problem {
                 .scale(Scale::Logarithmic)
                 .range(low..high));
         for (element, points) in &self.curves {
-            // An error of zero is below the last digit.
+            // An error of zero is less than the last digit of the reference.
             let points = points
                 .iter()
                 .map(|point| (1e3 * point.time, point.error.max(low)));
@@ -258,7 +258,8 @@ impl Problem {
     }
 }
 
-/// max |μ − μ_ref| / max |μ_ref|, NaN where one is; both lists have the largest modulus and the positive imaginary part first.
+/// max |μ − μ_ref| / max |μ_ref|, NaN if one is; in both lists the multiplier of largest modulus, or of positive
+/// imaginary part, comes first.
 fn error(multipliers: &[Complex<f64>], reference: &[Complex<f64>; 2]) -> f64 {
     assert_eq!(multipliers.len(), reference.len());
     let differences = multipliers
