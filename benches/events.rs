@@ -1,4 +1,5 @@
-//! What events cost: runs that look for one that never happens, or for one that happens now and then, over runs that look for none.
+//! The cost of events: times of runs that look for an event, one that never happens or one that happens now and then,
+//! relative to runs that look for none.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -41,7 +42,8 @@ struct DoublePendulum {
 )]
 struct HenonHeiles;
 
-/// The least nanoseconds a step of several runs of all kinds, one after the other so that all see the same machine.
+/// The smallest times per step in nanoseconds. All kinds of runs are measured in turn, so that they see the same
+/// machine.
 fn nanoseconds(mut runs: Vec<Box<dyn FnMut() -> usize + '_>>, steps: f64) -> Vec<f64> {
     let mut best = vec![f64::INFINITY; runs.len()];
     for _ in 0..30 {
@@ -83,7 +85,7 @@ fn measure<M: Model<N> + Send + Sync, const N: usize>(
 
 fn main() {
     println!(
-        "Runs that look for an event over runs that look for none; nodes are recorded every so often."
+        "Times of runs that look for an event, relative to runs that look for none; every n-th node is recorded."
     );
     println!("The first three never happen, the last one does.");
     let pendulum = Pendulum {

@@ -1,4 +1,5 @@
-//! Families: an evaluation of forces beside a loop written by hand, and the time of a step over the length.
+//! Models of run-time length: the generated evaluation of forces compared with a loop written by hand, and the time of
+//! a step over the length.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -6,7 +7,7 @@ use tfe::family::{self, Gradient, Model as _};
 use tfe::prelude::*;
 use tfe::runtime::step::Control;
 
-/// A chain with quadratic force, FPUT-α.
+/// The FPUT-α chain, with quadratic forces.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3),
@@ -18,7 +19,7 @@ struct Chain {
     a: f64,
 }
 
-/// The same forces as one would write them: the force of each spring once, carried to the next body.
+/// The same forces written by hand: the force of each spring is computed once and kept for the next body.
 fn by_hand(chain: &Chain, q: &[f64], force: &mut [f64]) {
     let n = chain.n;
     let (q, force) = (&q[..n], &mut force[..n]);
@@ -32,7 +33,7 @@ fn by_hand(chain: &Chain, q: &[f64], force: &mut [f64]) {
     force[n - 1] = -left;
 }
 
-/// The same without anything carried: every force from two springs, which a compiler turns into vectors.
+/// The same without keeping it: the force on each body is computed from two springs, a loop that compilers vectorise.
 fn by_hand_twice(chain: &Chain, q: &[f64], force: &mut [f64]) {
     let n = chain.n;
     let (q, force) = (&q[..n], &mut force[..n]);
@@ -44,7 +45,7 @@ fn by_hand_twice(chain: &Chain, q: &[f64], force: &mut [f64]) {
     force[n - 1] = -spring(q[n - 1] - q[n - 2]);
 }
 
-/// The least of several times of one call, in nanoseconds.
+/// The smallest of several times of one call, in nanoseconds.
 fn nanoseconds(mut call: impl FnMut()) -> f64 {
     let mut best = f64::INFINITY;
     for _ in 0..60 {
@@ -57,7 +58,7 @@ fn nanoseconds(mut call: impl FnMut()) -> f64 {
     best
 }
 
-/// Adds up differences, eight at a time.
+/// Adds up absolute differences, eight at a time.
 fn read(force: &[f64], expected: &[f64], off: &mut [f64; 8]) {
     let pairs = force.chunks_exact(8).zip(expected.chunks_exact(8));
     for (force, expected) in pairs {
@@ -78,7 +79,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut force = vec![0.0; chain.n];
     let mut expected = vec![0.0; chain.n];
     by_hand(&chain, &q, &mut expected);
-    // With a reader, as in a step.
+    // The result is read, as it is in a step.
     let mut off = [0.0; 8];
     let generated = nanoseconds(|| {
         let first = Gradient {
@@ -88,7 +89,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         };
         black_box(&chain).forces_inline(0.0, black_box(&q), black_box(&q), first);
         black_box(&force);
-        // It writes every place.
+        // The generated code writes all entries, so that they need not be cleared before.
         const { assert!(Chain::ASSIGNS) };
         read(&force, &expected, &mut off);
     });
@@ -109,7 +110,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     println!(
         "{:>8} {:>12} {:>14} {:>12}",
-        "n", "us a step", "ns a site", "iterations"
+        "n", "us per step", "ns per site", "iterations"
     );
     for n in [10, 100, 1000, 10_000, 100_000] {
         let chain = Chain { n, ..chain };

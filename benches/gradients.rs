@@ -1,4 +1,5 @@
-//! Gradients by many parameters over the runs that they are of: `cargo bench --features sparse --bench gradients`.
+//! The time of gradients by many parameters relative to that of the runs: `cargo bench --features sparse --bench
+//! gradients`.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -10,7 +11,7 @@ const STEP: f64 = 0.1;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Twelve masses on springs of a cubic force, each with its own mass, stiffness and damping.
+/// Twelve masses on springs with a cubic force; each has its own mass, stiffness and damping.
 #[dynamics(
     coordinates(q[12]),
     lagrangian = sum(i in 0..12, m[i]/2*dot(q[i])^2) - k[0]/2*q[0]^2 - sum(i in 1..12, k[i]/2*(q[i] - q[i-1])^2 + (q[i] - q[i-1])^4/4),
@@ -23,7 +24,7 @@ struct Chain {
     c: [f64; 12],
 }
 
-/// Thirty-two masses, a spring between any two of them, and one of another force to the ground.
+/// Thirty-two masses, with a spring between any two of them, and a spring with another force from each to the ground.
 #[dynamics(
     coordinates(q[32]),
     lagrangian = sum(i in 0..32, dot(q[i])^2/2 - a*q[i]^4/4)
@@ -35,7 +36,7 @@ struct Net {
     k: [f64; 1024],
 }
 
-/// The stiffnesses of the springs between masses in a row, as many as one likes.
+/// A row of masses of any number, with the stiffnesses of the springs between them as parameters.
 #[cfg(feature = "sparse")]
 #[dynamics(
     coordinates(q[n]),
@@ -49,7 +50,7 @@ struct Row {
     k: Vec<f64>,
 }
 
-/// The least time of several calls of all, one after the other so that they see the same machine.
+/// The smallest time of several calls of each; they are called in turn, so that all see the same machine.
 fn least(
     mut calls: [&mut dyn FnMut() -> Result<(), Failure>; 3],
 ) -> Result<[Duration; 3], Failure> {
@@ -94,7 +95,7 @@ where
 fn tell(name: &str, parameters: usize, [of_run, of_gradient, of_integral]: [Duration; 3]) {
     let micros = |time: Duration| time.as_secs_f64() * 1e6 / f64::from(STEPS);
     println!(
-        "{name:6} {parameters:5} parameters: {:7.2} µs a step of a run, {:7.2} of a gradient, {:.1} times as long, {:.1} times that of an integral",
+        "{name:6} {parameters:5} parameters: {:7.2} µs per step of a run, {:7.2} of a gradient of the end ({:.1} times), of an integral {:.1} times",
         micros(of_run),
         micros(of_gradient),
         micros(of_gradient) / micros(of_run),

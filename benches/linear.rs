@@ -1,4 +1,4 @@
-//! A linear model steps at the cost of one matrix–vector product: 20 masses in a row, 40 × 40.
+//! The step of a linear model costs as much as one matrix–vector product: 20 masses in a row, a matrix of 40 × 40.
 //!
 //! `cargo bench --bench linear` prints both times and their ratio.
 
@@ -7,7 +7,7 @@ use std::time::Instant;
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};
 
-/// Masses in a row between walls.
+/// A row of masses between walls.
 #[dynamics(
     coordinates(q[20]),
     lagrangian = sum(i in 0..20, dot(q[i])^2/2) - k/2*(q[0]^2 + q[19]^2) - sum(i in 0..19, k/2*(q[i+1] - q[i])^2),
@@ -19,7 +19,7 @@ struct Row {
 const SIZE: usize = 40;
 const STEPS: u32 = 100_000;
 
-/// y ← y + D y, the product by columns, as compilers like it best.
+/// y ← y + D y, the product by columns, which compilers vectorise best.
 fn product(columns: &[[f64; SIZE]; SIZE], y: &mut [f64; SIZE]) {
     let mut increment = [0.0; SIZE];
     for (column, factor) in columns.iter().zip(y.iter()) {
@@ -32,7 +32,7 @@ fn product(columns: &[[f64; SIZE]; SIZE], y: &mut [f64; SIZE]) {
     }
 }
 
-/// The same four columns at a time.
+/// The same with four columns at a time.
 fn blocked(columns: &[[f64; SIZE]; SIZE], y: &mut [f64; SIZE]) {
     let mut increment = [0.0; SIZE];
     for ([c0, c1, c2, c3], f) in columns.as_chunks().0.iter().zip(y.as_chunks::<4>().0) {
@@ -45,7 +45,7 @@ fn blocked(columns: &[[f64; SIZE]; SIZE], y: &mut [f64; SIZE]) {
     }
 }
 
-/// The best of several runs, in nanoseconds a step.
+/// The smallest time of several runs, in nanoseconds per step.
 fn best(mut run: impl FnMut()) -> f64 {
     let time = |_| {
         let start = Instant::now();
@@ -100,9 +100,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     println!("product of a 40 x 40 matrix and a vector   {plain:8.1} ns");
     println!("the same, four columns at a time           {four:8.1} ns");
-    println!("step of the model, compensated             {stepped:8.1} ns");
+    println!("step of the model, compensated summation   {stepped:8.1} ns");
     println!(
-        "ratio to the better one                    {:8.2}",
+        "ratio of the step to the faster product    {:8.2}",
         stepped / plain.min(four)
     );
     Ok(())

@@ -1,6 +1,7 @@
-//! All points of an element at once against one after the other: the same fixed-point iteration of `Mixed::<9>`, eight points.
+//! All quadrature points of an element evaluated at once, compared with one after the other: the same fixed-point
+//! iteration of `Mixed::<9>` with eight points.
 //!
-//! `cargo bench --bench points` prints both times and their ratio.
+//! `cargo bench --bench points` prints both times per step and their ratio.
 
 use std::hint::black_box;
 use std::time::Instant;
@@ -35,7 +36,7 @@ struct DoublePendulum {
 #[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2 + x^2 + y^2)/2 + x^2*y - y^3/3)]
 struct HenonHeiles {}
 
-/// Toda's lattice of three masses: exponentials.
+/// Toda's lattice of three masses, with exponentials.
 #[dynamics(
     coordinates(a, b, c),
     momenta(pa, pb, pc),
@@ -43,14 +44,14 @@ struct HenonHeiles {}
 )]
 struct Toda {}
 
-/// Coulomb friction made smooth.
+/// Smoothed Coulomb friction.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = -mu*tanh(dot(x)/eps))]
 struct Friction {
     mu: f64,
     eps: f64,
 }
 
-/// Forces that are logarithms.
+/// Forces with logarithms.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2 - x^2/2 - y^2/2,
@@ -58,13 +59,13 @@ struct Friction {
 )]
 struct Logarithms {}
 
-/// A central force of any power of the distance.
+/// A central force proportional to a power of the distance.
 #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + (x^2 + y^2)^(-k/2))]
 struct Power {
     k: f64,
 }
 
-/// A spring wound about an axis.
+/// A spring that winds about an axis.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2 - k/2*atan2(y, x)^2 - (x^2 + y^2)/2,
@@ -78,7 +79,7 @@ const ELEMENT: Element = Mixed::<9>.element();
 
 type Failure = Box<dyn std::error::Error>;
 
-/// The best of several runs, in nanoseconds a step.
+/// The smallest time of several runs, in nanoseconds per step.
 fn best(mut run: impl FnMut() -> Result<(), Failure>) -> Result<f64, Failure> {
     let mut best = f64::INFINITY;
     for _ in 0..15 {

@@ -1,4 +1,5 @@
-//! Instructions of every case of the record of results (`tests/record`), counted by valgrind's callgrind: repeatable, whatever else the machine does.
+//! The number of instructions of each case of the record of results (`tests/record`), counted by callgrind (valgrind):
+//! the counts are repeatable, whatever else the machine does.
 //!
 //! ```sh
 //! cargo bench --bench record > before.txt
@@ -15,14 +16,14 @@ use std::error::Error;
 use std::hint::black_box;
 use std::process::Command;
 
-/// What is counted: callgrind begins and ends with this function.
+/// The function that is counted: callgrind starts and stops counting with it.
 #[inline(never)]
 fn counted_case(case: &Case) -> usize {
     let outcome = black_box((case.run)());
     outcome.numbers.len() + outcome.counts.len()
 }
 
-/// Instructions of one case, by this program under valgrind.
+/// The instructions of one case, from running this program under valgrind.
 fn instructions(name: &str) -> Result<u64, Box<dyn Error>> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
@@ -37,7 +38,7 @@ fn instructions(name: &str) -> Result<u64, Box<dyn Error>> {
         .ok_or_else(|| format!("{name}: no total in what valgrind says: {text}").into())
 }
 
-/// A table of an earlier run: instructions and a name in each line.
+/// The table of an earlier run: a number of instructions and a name in each line.
 fn table(path: &str) -> Result<BTreeMap<String, u64>, Box<dyn Error>> {
     let text = std::fs::read_to_string(path)?;
     let entry = |line: &str| {
@@ -58,13 +59,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (before, wanted) = match words[..] {
         ["--case", name] => {
             if let Some(case) = cases.iter().find(|case| case.name == name) {
-                // Ensembles on this thread, which is the one that is counted.
+                // Ensembles run on this thread, the only one that is counted.
                 #[cfg(feature = "parallel")]
                 rayon::ThreadPoolBuilder::new()
                     .num_threads(1)
                     .use_current_thread()
                     .build_global()?;
-                // Once for memory and functions to be found.
+                // A first run, not counted, to allocate memory and load functions.
                 black_box((case.run)());
                 counted_case(case);
             }

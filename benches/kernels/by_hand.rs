@@ -1,4 +1,5 @@
-//! The same kernels as an expert writes them: common factors and trigonometry worked out on paper, every symmetric entry once.
+//! The same kernels as an expert would write them: common factors and trigonometry simplified on paper, every symmetric
+//! entry computed once.
 
 mod arms;
 mod bodies;
@@ -12,8 +13,8 @@ mod tops;
 
 use tfe::runtime::{First, Real, Second};
 
-/// Kernels with the arguments, the results and the promises of `Model::first` and `Model::second`: what can be non-zero is written,
-/// nothing is read.
+/// Kernels with the arguments, results and guarantees of `Model::first` and `Model::second`: all entries that can be
+/// non-zero are written, and none is read.
 pub trait ByHand<const N: usize> {
     /// First derivatives.
     fn first<R: Real>(&self, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>);

@@ -1,19 +1,20 @@
-//! Instructions a call: this program runs itself under valgrind, with two numbers of repetitions, and takes the difference.
+//! Instructions per call: this program runs itself under valgrind with two numbers of repetitions, and takes the
+//! difference.
 
 use crate::case::{Case, Kernel, Writer};
 use crate::error::Error;
 use std::process::{Command, Stdio};
 
-/// Instructions a call of both kernels.
+/// The instructions per call of both kernels.
 #[derive(Clone, Copy, Debug)]
 pub struct Instructions {
     /// Of the generated kernel.
     pub generated: u64,
-    /// Of the other one.
+    /// Of the hand-written kernel.
     pub hand: u64,
 }
 
-/// Whether valgrind can be called.
+/// Whether valgrind is installed.
 pub fn available() -> bool {
     Command::new("valgrind")
         .arg("--version")
@@ -23,7 +24,8 @@ pub fn available() -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Instructions of both kernels, without those of the loop and of an empty function.
+/// The instructions of both kernels, without those of the loop and of the call, which are measured with an empty
+/// function.
 pub fn instructions(case: &dyn Case, kernel: Kernel) -> Result<Instructions, Error> {
     let nothing = a_call(case, kernel, Writer::Nothing)?;
     let of = |writer| Ok(a_call(case, kernel, writer)?.saturating_sub(nothing));
@@ -34,7 +36,7 @@ pub fn instructions(case: &dyn Case, kernel: Kernel) -> Result<Instructions, Err
 }
 
 fn a_call(case: &dyn Case, kernel: Kernel, writer: Writer) -> Result<u64, Error> {
-    // Some for the loader to have found all functions, then a round number more.
+    // A few calls first, so that the loader has found all functions, and then a round number of calls more.
     const FEW: u32 = 16;
     const MORE: u32 = 1000;
     let few = total(case, kernel, writer, FEW)?;
@@ -42,7 +44,7 @@ fn a_call(case: &dyn Case, kernel: Kernel, writer: Writer) -> Result<u64, Error>
     Ok(many.saturating_sub(few).div_ceil(u64::from(MORE)))
 }
 
-/// Instructions of the whole program.
+/// The instructions of the whole program.
 fn total(case: &dyn Case, kernel: Kernel, writer: Writer, times: u32) -> Result<u64, Error> {
     let program = std::env::current_exe().map_err(Error::Count)?;
     let output = Command::new("valgrind")

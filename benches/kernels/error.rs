@@ -1,17 +1,17 @@
-//! What can go wrong.
+//! The errors.
 
 use std::fmt;
 
 /// Why the table cannot be printed.
 #[derive(Debug)]
 pub enum Error {
-    /// Generated and hand-written kernels do not give the same.
+    /// The results of a generated and a hand-written kernel differ.
     Disagreement(Disagreement),
-    /// Command line that is not understood.
+    /// The command line is invalid.
     Usage(String),
     /// The program could not be run again to count instructions.
     Count(std::io::Error),
-    /// The counting program did not say how many.
+    /// The output of the counting program has no total.
     NoTotal(String),
 }
 
@@ -22,11 +22,11 @@ pub struct Disagreement {
     pub case: &'static str,
     /// The array of the result.
     pub array: &'static str,
-    /// Where in it, row by row.
+    /// The index in it, row by row.
     pub index: usize,
     /// The generated value.
     pub generated: f64,
-    /// The other one.
+    /// The hand-written value.
     pub hand: f64,
 }
 

@@ -1,13 +1,13 @@
-//! Generated kernels beside hand-written ones: operations, instructions and nanoseconds a call.
+//! Generated kernels compared with hand-written ones: operations, instructions and nanoseconds per call.
 //!
 //! `cargo bench --bench kernels` prints the table; `cargo bench --bench kernels -- pendulum heavy-top` only these
 //! models; and `cargo bench --bench kernels -- --instructions` no times, for a machine that is busy with other things.
 //! The optimiser was developed on the first ten models; the six after them were declared and written by hand without
-//! looking at what is emitted.
+//! looking at the generated code.
 //!
-//! Instructions are counted where valgrind is installed; it counts a filling instruction (`rep stos`) once for each
-//! byte or word, so what clears memory looks dearer there than in nanoseconds. Before anything is measured, both
-//! kernels are compared at several states.
+//! Instructions are counted if valgrind is installed. It counts a fill instruction (`rep stos`) once for each byte or
+//! word, so that clearing memory looks more expensive there than in nanoseconds. Before anything is measured, the
+//! results of both kernels are compared at several states.
 
 mod by_hand;
 mod case;
@@ -31,8 +31,8 @@ fn cases() -> Vec<Box<dyn Case>> {
     developed().into_iter().chain(others()).collect()
 }
 
-/// The models on which the optimiser was developed, with numbers of ordinary size for all parameters: no product is
-/// exact, none is much larger than another.
+/// The models on which the optimiser was developed. All parameters are generic numbers of ordinary size: no product is
+/// exact, and none is much larger than another.
 fn developed() -> [Box<dyn Case>; 10] {
     let (m1, m2, m3, l1, l2, l3, g) = (1.3, 0.7, 0.9, 1.1, 0.8, 0.6, 9.81);
     let pendulum = Pendulum { m: m1, l: l1, g };
@@ -104,7 +104,7 @@ fn developed() -> [Box<dyn Case>; 10] {
     ]
 }
 
-/// The other models, with such numbers, too.
+/// The other models, also with generic parameters.
 fn others() -> [Box<dyn Case>; 6] {
     let g = 9.81;
     let cart = SphericalPendulumOnCart {
@@ -178,7 +178,7 @@ fn others() -> [Box<dyn Case>; 6] {
     ]
 }
 
-/// Which of them, by the argument that says so.
+/// The models named by the arguments.
 fn find<T>(
     all: impl IntoIterator<Item = T>,
     argument: &str,
@@ -189,7 +189,7 @@ fn find<T>(
         .ok_or_else(|| Error::Usage(argument.to_owned()))
 }
 
-/// The argument for no times.
+/// The argument for leaving out times.
 const INSTRUCTIONS: &str = "--instructions";
 
 fn run(arguments: &[&str]) -> Result<(), Error> {

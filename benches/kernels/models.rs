@@ -13,7 +13,7 @@ pub struct Pendulum {
     pub g: f64,
 }
 
-/// Two point masses, declared by where they are.
+/// Two point masses on rods, declared by their positions.
 #[dynamics(
     coordinates(a, b),
     let x1 = l1*sin(a),
@@ -30,7 +30,7 @@ pub struct DoublePendulum {
     pub g: f64,
 }
 
-/// The same, declared by the formula of the textbooks.
+/// The same, declared by the Lagrangian of the textbooks.
 #[dynamics(
     coordinates(a, b),
     lagrangian = (m1 + m2)*l1^2/2*dot(a)^2 + m2*l2^2/2*dot(b)^2 + m2*l1*l2*dot(a)*dot(b)*cos(a - b)
@@ -44,7 +44,7 @@ pub struct DoublePendulumAngles {
     pub g: f64,
 }
 
-/// Three point masses, declared by where they are.
+/// Three point masses on rods, declared by their positions.
 #[dynamics(
     coordinates(a, b, c),
     let x1 = l1*sin(a),
@@ -85,7 +85,7 @@ pub struct TriplePendulumAngles {
     pub g: f64,
 }
 
-/// A star in a galaxy.
+/// The Hénon–Heiles system.
 #[dynamics(
     coordinates(x, y),
     momenta(px, py),
@@ -95,7 +95,7 @@ pub struct HenonHeiles {
     pub lambda: f64,
 }
 
-/// A heavy symmetric top about a fixed point: moments `a`, `a`, `c`, Euler's angles.
+/// A heavy symmetric top with a fixed point: moments of inertia `a`, `a`, `c`, Euler angles.
 #[dynamics(
     coordinates(phi, theta, psi),
     lagrangian = a/2*(dot(theta)^2 + (dot(phi)*sin(theta))^2) + c/2*(dot(psi) + dot(phi)*cos(theta))^2 - m*g*l*cos(theta),
@@ -108,7 +108,7 @@ pub struct HeavyTop {
     pub l: f64,
 }
 
-/// A free body, three different moments, Euler's angles.
+/// A free rigid body with three different moments of inertia, Euler angles.
 #[dynamics(
     coordinates(phi, theta, psi),
     let o1 = dot(phi)*sin(theta)*sin(psi) + dot(theta)*cos(psi),
@@ -144,8 +144,8 @@ pub struct Fput {
     pub a: f64,
 }
 
-/// A spherical pendulum that hangs from a cart on a straight track: its angle from the vertical and its azimuth from
-/// the track.
+/// A spherical pendulum on a cart that moves on a straight track; its angles are that from the vertical and the azimuth
+/// from the track.
 #[dynamics(
     coordinates(x, theta, phi),
     let r = [x + l*sin(theta)*cos(phi), l*sin(theta)*sin(phi), -l*cos(theta)],
@@ -158,8 +158,8 @@ pub struct SphericalPendulumOnCart {
     pub g: f64,
 }
 
-/// Foucault's pendulum of any amplitude, by its place over the ground: x north, y west, z up, on a planet that turns at
-/// `omega`.
+/// Foucault's pendulum with arbitrary amplitude, by its position over the ground: x north, y west, z up, on a planet
+/// that rotates at `omega`.
 #[dynamics(
     coordinates(x, y),
     let z = -sqrt(l^2 - x^2 - y^2),
@@ -175,9 +175,9 @@ pub struct Foucault {
     pub latitude: f64,
 }
 
-/// A satellite on a circular orbit of the angular velocity `n`, turned by the gradient of gravity: a quaternion from
-/// body to space, scalar first, and three moments of inertia. `up` is the local vertical in the body; the condition |e|
-/// = 1 is no part of the kernels.
+/// A satellite on a circular orbit with angular velocity `n`, under the gravity-gradient torque: a quaternion from body
+/// to space, scalar first, and three moments of inertia. `up` is the local vertical in the body; the constraint |e| = 1
+/// does not enter the kernels.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -191,9 +191,9 @@ pub struct Satellite {
     pub n: f64,
 }
 
-/// An arm in space: a column that turns about z, an upper arm and a forearm about axes y of their own, by the angles of
-/// the joints. Each link has its mass at the distance `s` from the joint, a moment `i` about its length and `j` across
-/// it.
+/// A spatial robot arm: a column that turns about z, and an upper arm and a forearm that turn about parallel horizontal
+/// axes, by the joint angles. Each link has its centre of mass at the distance `s` from the joint, and moments of
+/// inertia `i` about its length and `j` across it.
 #[dynamics(
     coordinates(a, b, c),
     let d = b + c,
@@ -222,9 +222,9 @@ pub struct SpatialArm {
     pub g: f64,
 }
 
-/// An arm of two links in a vertical plane with elastic joints: angles of the links, the second from the first, and of
-/// the motors behind the gears. Each link has its mass at the distance `s` from the joint and a moment `i` about it,
-/// each motor a moment `j`.
+/// A planar arm of two links in a vertical plane with elastic joints: angles of the links, the second relative to the
+/// first, and of the motors behind the gears. Each link has its centre of mass at the distance `s` from the joint and a
+/// moment of inertia `i` about it, each motor a moment `j`.
 #[dynamics(
     coordinates(a, b, c, d),
     let x1 = s1*cos(a),
@@ -250,7 +250,7 @@ pub struct ElasticArm {
     pub g: f64,
 }
 
-/// A bead on a wire bent to an ellipse that turns about its vertical axis at `omega`.
+/// A bead on an elliptic wire that turns about its vertical axis at `omega`.
 #[dynamics(
     coordinates(s),
     let r = a*sin(s),

@@ -1,8 +1,10 @@
-//! Steppers as an expert writes them for one model: Gauss elements with all points in AVX2 registers.
+//! Steppers as an expert would write them for one model: Gauss elements with all quadrature points in AVX2 registers.
 //!
-//! They take the tableau from the crate and nothing else of it. The iteration is a fixed point from the polynomial of the last element, products with tables and polynomials of sines are fused,
-//! sums from step to step are compensated, and an iteration ends by the rule of the crate's own steppers at the same tolerance. They check nothing else: no energy, no evidence for the root, no
-//! other iteration where this one does not contract.
+//! They use the crate for the tableau only. The fixed-point iteration starts from the extrapolated polynomial of the
+//! last element; products with tables and polynomials for the sine are fused; sums over the steps are compensated; and
+//! the iteration stops by the rule and with the tolerance of the crate's own steppers. They check nothing else: neither
+//! the energy nor whether the iteration found the right root, and they have no other iteration for when this one does
+//! not converge.
 
 mod coupled;
 mod lanes;
@@ -19,16 +21,17 @@ pub use pulp::x86::V3;
 pub use second_order::{SecondOrder, SecondOrderStepper};
 pub use side_by_side::{LANES, SideBySide};
 
-/// Below one rounding, as [`Control`](tfe::runtime::step::Control) has it.
+/// Less than one rounding error; the tolerance of [`Control`](tfe::runtime::step::Control).
 const TOLERANCE: f64 = 0.05 * f64::EPSILON;
 
-/// Increments below it are roundings, if they no longer fall.
+/// Increments below this are rounding errors if they no longer decrease.
 const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
 
-/// More iterations are a failure.
+/// More iterations count as a failure.
 const MAX_ITERATIONS: u32 = 50;
 
-/// Whether what an increment leaves, `size`²/(`last` − `size`), is below the tolerance; all are multiples of `scale`.
+/// Whether the estimated remaining error after an increment, `size`²/(`last` − `size`), is below the tolerance; all are
+/// multiples of `scale`.
 #[inline(always)]
 fn is_converged(size: f64, last: f64, scale: f64) -> bool {
     if last.is_infinite() {
@@ -40,7 +43,7 @@ fn is_converged(size: f64, last: f64, scale: f64) -> bool {
     }
 }
 
-/// Adds to a number that carries what rounding took from it.
+/// Adds to a number with compensation: the carry keeps what rounding lost.
 #[inline(always)]
 fn add((number, low): (&mut f64, &mut f64), change: f64) {
     let change = change + *low;

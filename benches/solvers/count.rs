@@ -1,9 +1,9 @@
-//! Instructions a step: this program runs itself under valgrind, with two numbers of steps, and takes the difference.
+//! Instructions per step: this program runs itself under valgrind with two numbers of steps, and takes the difference.
 
 use crate::{Failure, Writer};
 use std::process::{Command, Stdio};
 
-/// Whether valgrind can be called.
+/// Whether valgrind is installed.
 pub fn available() -> bool {
     Command::new("valgrind")
         .arg("--version")
@@ -13,7 +13,7 @@ pub fn available() -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Nothing where valgrind stops at an instruction that it does not know, as old ones do.
+/// The instructions per step; `None` if valgrind stops at an instruction that it does not know, as old versions do.
 pub fn instructions(scene: &str, nodes: u32, writer: Writer) -> Result<Option<u64>, Failure> {
     const FEW: u32 = 50;
     const MORE: u32 = 500;
@@ -25,7 +25,7 @@ pub fn instructions(scene: &str, nodes: u32, writer: Writer) -> Result<Option<u6
     Ok(Some(many.saturating_sub(few).div_ceil(u64::from(MORE))))
 }
 
-/// Instructions of the whole program.
+/// The instructions of the whole program.
 fn total(scene: &str, nodes: u32, writer: Writer, steps: u32) -> Result<Option<u64>, Failure> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])

@@ -1,8 +1,14 @@
-//! Steps of emitted solvers and of the general stepper beside steppers written by hand: instructions, nanoseconds, iterations, errors.
+//! Emitted solvers and the general stepper, compared with steppers written by hand: instructions, nanoseconds,
+//! iterations and errors per step.
 //!
-//! `cargo bench --bench solvers` prints the table; `cargo bench --bench solvers -- pendulum kepler` only these scenes; and `-- --instructions` no times, for a machine that is busy with other
-//! things; and `-- starts` thousands of starts alone: lanes written by hand, an ensemble on one core, emitted solvers one start after the other. All three take the same steps to the same tolerance, from and to memory, one call a step. Errors are those of the end, of coordinates, over the largest one, by a run of
-//! `Mixed::<12>` in steps half as long. Instructions are counted where valgrind is installed; what is written by hand runs where the processor has AVX2.
+//! `cargo bench --bench solvers` prints the table; `cargo bench --bench solvers -- pendulum kepler` only these scenes;
+//! `-- --instructions` no times, for a machine that is busy with other things; `-- starts` only the runs from thousands
+//! of initial states: lanes written by hand, an ensemble on one core, and emitted solvers one after the other.
+//!
+//! All of them take the same steps to the same tolerance, from and to memory, with one call per step. In the table,
+//! `e/h` is the ratio of emitted to hand-written, `g/e` that of general to emitted. Errors are those of the coordinates
+//! at the end, relative to the largest one, compared with a run of `Mixed::<12>` with half the step size. Instructions
+//! are counted if valgrind is installed; the steppers written by hand need a processor with AVX2.
 
 #[cfg(target_arch = "x86_64")]
 mod by_hand;
@@ -14,7 +20,7 @@ use std::time::Duration;
 
 type Failure = Box<dyn std::error::Error>;
 
-/// Who wrote a stepper.
+/// Which stepper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Writer {
     Hand,
@@ -34,29 +40,29 @@ impl Writer {
     }
 }
 
-/// What has come of a run.
+/// The results of a run.
 struct Run {
-    /// Coordinates at the end.
+    /// The coordinates at the end.
     end: Vec<f64>,
     iterations: u64,
-    /// Of all steps.
+    /// The iterations of all steps.
     time: Duration,
 }
 
-/// A model, a start, an element and a step.
+/// A scene: model, initial state, element and step.
 struct Scene {
     name: &'static str,
     nodes: u32,
-    /// A run of so many steps; nothing where the processor cannot run it.
+    /// Runs a number of steps; `None` if the processor cannot run the stepper.
     run: Box<dyn Fn(Writer, u32) -> Result<Option<Run>, Failure>>,
-    /// The end after so many steps.
+    /// The accurate end after a number of steps.
     reference: Box<dyn Fn(u32) -> Result<Vec<f64>, Failure>>,
 }
 
 const STEPS: u32 = 1000;
 const TURNS: u32 = 30;
 
-/// Figures of one writer.
+/// The figures of one stepper.
 #[derive(Clone, Copy, Default)]
 struct Figures {
     instructions: Option<u64>,
@@ -96,7 +102,7 @@ fn measure(scene: &Scene, counts: bool, times: bool) -> Result<[Option<Figures>;
     Ok(figures)
 }
 
-/// The largest difference over the largest coordinate; NaN where there is one.
+/// The largest difference divided by the largest coordinate; NaN if there is one.
 fn error(end: &[f64], reference: &[f64]) -> f64 {
     let size = reference.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
     let difference = |(x, y): (&f64, &f64)| (x - y).abs();
@@ -108,7 +114,7 @@ fn error(end: &[f64], reference: &[f64]) -> f64 {
         / size
 }
 
-/// Right-aligned, or a dash.
+/// A right-aligned number, or a dash.
 fn cell(number: Option<f64>, digits: usize) -> String {
     number.map_or("–".to_owned(), |number| format!("{number:.digits$}"))
 }
@@ -158,7 +164,7 @@ fn main() -> Result<(), Failure> {
         .any(|argument| argument == "--instructions");
     let names: Vec<&String> = arguments.iter().filter(|a| !a.starts_with('-')).collect();
     println!(
-        "                          instructions a step                  nanoseconds a step             iterations     error"
+        "                          instructions per step                nanoseconds per step            iterations     error"
     );
     println!(
         "scene          nodes    hand emitted general  e/h   g/e    hand emitted general  e/h   g/e  hand emitted  hand emitted"

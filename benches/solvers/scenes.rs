@@ -1,4 +1,4 @@
-//! The models, each with steppers of four and of nine nodes, and how they are run.
+//! The models, each with solvers of four and of nine nodes, and how they are run.
 
 #[cfg(target_arch = "x86_64")]
 use crate::by_hand::{self, CoupledStepper, SecondOrderStepper};
@@ -9,7 +9,7 @@ use tfe::prelude::*;
 use tfe::runtime::Model;
 use tfe::runtime::step::{Control, Stepper};
 
-/// Unit length, mass and gravity.
+/// A pendulum with unit length, mass and gravity.
 #[dynamics(
     coordinates(theta),
     lagrangian = dot(theta)^2/2 + cos(theta),
@@ -59,7 +59,7 @@ pub struct Planets {
     pub m: [f64; 6],
 }
 
-/// Unit masses between walls, springs of force δ + α δ².
+/// Unit masses between walls, with springs of force δ + α δ².
 #[dynamics(
     coordinates(q[32]),
     lagrangian = sum(i in 0..32, dot(q[i])^2/2) - sum(i in 0..31, (q[i+1] - q[i])^2/2 + alpha/3*(q[i+1] - q[i])^3)
@@ -82,7 +82,7 @@ pub struct VanDerPol {
     pub mu: f64,
 }
 
-/// About a fixed point: moments `a`, `a`, `c`, weight times distance `w`, Euler's angles.
+/// A heavy top about a fixed point: moments of inertia `a`, `a`, `c`, weight times distance `w`, Euler angles.
 #[dynamics(
     coordinates(phi, theta, psi),
     lagrangian = a/2*(dot(theta)^2 + (dot(phi)*sin(theta))^2) + c/2*(dot(psi) + dot(phi)*cos(theta))^2 - w*cos(theta),
@@ -119,7 +119,8 @@ where
     })
 }
 
-/// A scene: name, model, start; a solver, its nodes and its step; what is written by hand, from coordinates and velocities or momenta.
+/// A scene: name, model, initial state; the emitted solver, its number of nodes and its step; the stepper written by
+/// hand, and whether it starts from velocities or momenta.
 macro_rules! scene {
     ($name:literal, $model:expr, $start:expr, $solver:ident $nodes:literal, $h:literal, $stepper:ident of $hand:expr, $second:expr) => {
         Scene {
@@ -193,7 +194,8 @@ const TOP: HeavyTop = HeavyTop {
 const FPUT: Fput = Fput { alpha: 0.25 };
 const VAN_DER_POL: VanDerPol = VanDerPol { mu: 1.0 };
 
-/// Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune, Pluto: astronomical units, days, masses of the Sun. [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.2.4]
+/// The Sun with the inner planets, Jupiter, Saturn, Uranus, Neptune and Pluto: astronomical units, days, solar masses.
+/// [Hairer, Lubich, Wanner, Geometric Numerical Integration, I.2.4]
 const PLANETS: Planets = Planets {
     g: 2.959_122_082_86e-4,
     m: [
@@ -254,7 +256,7 @@ fn first_mode() -> State<32> {
     FPUT.state(q, [0.0; 32])
 }
 
-/// Each scene with four and with nine nodes.
+/// All scenes, each with four and with nine nodes.
 pub fn all() -> Vec<Scene> {
     macro_rules! both {
         ($($name:literal, $model:expr, $start:expr, [$four:ident $h4:literal, $nine:ident $h9:literal], $stepper:ident of $hand:expr, $second:expr;)*) => {

@@ -1,4 +1,5 @@
-//! Thousands of starts on one core: lanes written by hand, an ensemble, and emitted solvers one start after the other.
+//! Thousands of initial states on one core: lanes written by hand, an ensemble, and emitted solvers one after the
+//! other.
 
 #[cfg(target_arch = "x86_64")]
 use crate::by_hand::{self, LANES, SideBySide};
@@ -13,10 +14,10 @@ const STARTS: usize = 4096;
 const STEPS: u32 = 50;
 const TURNS: u32 = 7;
 
-/// Coordinates at the ends, and how long it took; nothing where the processor cannot.
+/// The coordinates at the ends and the time; `None` if the processor cannot run it.
 type Outcome<const N: usize> = Option<(Vec<[f64; N]>, Duration)>;
 
-/// On one processor.
+/// An ensemble on one core.
 fn alone<T: Send>(f: impl FnOnce() -> T + Send) -> Result<T, Failure> {
     #[cfg(feature = "parallel")]
     {
@@ -52,7 +53,7 @@ where
     Ok(Some((coordinates, time)))
 }
 
-/// With momenta that are velocities.
+/// Momenta that are equal to velocities.
 #[cfg(target_arch = "x86_64")]
 fn by_hand<F, const N: usize, const K: usize>(
     model: F,
@@ -80,7 +81,8 @@ where
     Ok(Some((ends, clock.elapsed())))
 }
 
-/// A line of the table: name, model, starts; a solver, its nodes and its step; what is written by hand.
+/// A row of the table: name, model, initial states; the emitted solver, its number of nodes and its step; the stepper
+/// written by hand.
 macro_rules! compare {
     ($name:literal, $model:expr, $starts:expr, $solver:ident $nodes:literal, $h:literal, $hand:expr) => {{
         let (model, starts) = ($model, &$starts);
@@ -143,16 +145,16 @@ fn show<const N: usize>(
     Ok(())
 }
 
-/// So many starts between two ends.
+/// A number of values evenly distributed between two ends.
 fn starts<const N: usize>(start: impl Fn(f64) -> State<N>) -> Vec<State<N>> {
     (0..STARTS)
         .map(|k| start(k as f64 / STARTS as f64))
         .collect()
 }
 
-/// The table.
+/// Prints the table.
 pub fn show_all() -> Result<(), Failure> {
-    println!("\n{STARTS} starts on one core, nanoseconds a step of one");
+    println!("\n{STARTS} initial states on one core, nanoseconds per step of one");
     println!("scene          nodes    hand ensemble one by one    e/h   e/o  difference");
     let angles = starts(|f| Pendulum {}.state([2.5 * f], [0.0]));
     compare!("pendulum", Pendulum {}, angles, Pendulum4 4, 0.1, by_hand::Pendulum);

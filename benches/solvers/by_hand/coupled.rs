@@ -1,28 +1,28 @@
-//! p = M(q) q̇, ṗ = f(q, q̇): velocities are the unknowns.
+//! Equations p = M(q) q̇, ṗ = f(q, q̇), with the velocities as the unknowns.
 
 use super::lanes::Quad;
 use super::tables::{Tables, largest, product, weighted};
 use super::{MAX_ITERATIONS, add, is_converged};
 use pulp::x86::V3;
 
-/// A model.
+/// The equations of a model.
 pub trait Coupled<const N: usize> {
-    /// What velocities need of the positions.
+    /// What is computed from the positions once and needed for the velocities.
     type Masses: Copy;
 
-    /// The coordinates that the equations hold.
+    /// The coordinates on which the equations depend.
     const NEEDED: [bool; N] = [true; N];
 
-    /// The momenta that change.
+    /// The momenta that are not constant.
     const FORCED: [bool; N] = [true; N];
 
-    /// Forces, and masses.
+    /// The forces and the mass matrix.
     fn forces(&self, q: &[Quad; N], v: &[Quad; N]) -> ([Quad; N], Self::Masses);
 
     fn velocities(&self, masses: &Self::Masses, p: &[Quad; N]) -> [Quad; N];
 }
 
-/// Steps of one length.
+/// A stepper with constant step size.
 pub struct CoupledStepper<F, const N: usize, const K: usize, const C: usize> {
     isa: V3,
     model: F,
@@ -32,14 +32,14 @@ pub struct CoupledStepper<F, const N: usize, const K: usize, const C: usize> {
     p: [f64; N],
     q_low: [f64; N],
     p_low: [f64; N],
-    /// Of the last step.
+    /// The iterations of the last step.
     velocities: [[[f64; 4]; C]; N],
     is_warm: bool,
     pub iterations: u64,
 }
 
 impl<F: Coupled<N>, const N: usize, const K: usize, const C: usize> CoupledStepper<F, N, K, C> {
-    /// From positions and momenta.
+    /// Starts from positions and momenta.
     pub fn new(isa: V3, model: F, h: f64, (q, p): ([f64; N], [f64; N])) -> Self {
         Self {
             isa,
@@ -56,7 +56,7 @@ impl<F: Coupled<N>, const N: usize, const K: usize, const C: usize> CoupledStepp
         }
     }
 
-    /// One step; false if it failed.
+    /// Makes one step; returns false if it failed.
     pub fn advance(&mut self) -> bool {
         let isa = self.isa;
         isa.vectorize(Step(self))
@@ -87,7 +87,7 @@ impl<F: Coupled<N>, const N: usize, const K: usize, const C: usize> CoupledStepp
                 velocities[a] = [start[a]; C];
             }
         }
-        // Of velocities a quarter of the change over them, of positions h times it.
+        // Changes of velocities, relative to their size, weighted by a quarter, and of positions by h.
         let (step, size) = (self.h.abs(), largest(&velocities));
         let scale = (distance / step).max(size).min(4.0 * size);
         let (mut last, mut iterations) = (f64::INFINITY, 0);

@@ -1,10 +1,10 @@
-//! Four numbers in a register.
+//! Four numbers in an AVX2 register.
 
 use core::ops::{Add, Div, Mul, Neg, Sub};
 use pulp::x86::V3;
 use pulp::{f64x4, u64x4};
 
-/// A register, and the proof that the processor has it.
+/// A register; it can only be made if the processor has AVX2.
 #[derive(Clone, Copy)]
 pub struct Quad {
     isa: V3,
@@ -124,7 +124,7 @@ impl Quad {
         (a + c) + (b + d)
     }
 
-    /// x − n π and n in the last bits of a number; for |x| up to some thousands.
+    /// x − n π, and n in the last bits of a number; for |x| up to some thousands.
     #[inline(always)]
     fn reduced(self) -> (Self, Self) {
         const ROUNDER: f64 = 6_755_399_441_055_744.0; // 1.5 · 2⁵²
@@ -138,7 +138,7 @@ impl Quad {
         (n.times_from(self.splat(PI_LOW), rest), shifted)
     }
 
-    /// Negative where the last bit of `count` is set.
+    /// Negative if the last bit of `count` is set.
     #[inline(always)]
     fn with_sign_of(self, count: Self) -> Self {
         let (bits, count): (u64x4, u64x4) = (pulp::cast(self.value), pulp::cast(count.value));
@@ -176,7 +176,7 @@ impl Quad {
         z.times_plus(self.polynomial(z, &COS), self.splat(1.0))
     }
 
-    /// Ten coefficients by halves (Estrin).
+    /// A polynomial with ten coefficients, evaluated by Estrin's scheme.
     #[inline(always)]
     fn polynomial(self, z: Self, c: &[f64; 10]) -> Self {
         let square = z * z;
@@ -195,7 +195,7 @@ impl Quad {
 const SIN: [f64; 10] = taylor(3.0);
 const COS: [f64; 10] = taylor(2.0);
 
-/// −1/n!, 1/(n + 2)!, …
+/// The coefficients −1/n!, 1/(n + 2)!, …
 const fn taylor(from: f64) -> [f64; 10] {
     let (mut coefficients, mut n) = ([0.0; 10], from);
     let mut term = if from == 2.0 { -0.5 } else { -1.0 / 6.0 };

@@ -1,4 +1,4 @@
-//! The equations of the scenes, as one writes them down.
+//! The equations of the scenes, written by hand.
 
 use super::coupled::Coupled;
 use super::lanes::Quad;
@@ -34,7 +34,7 @@ impl SecondOrder<2> for HenonHeiles {
     }
 }
 
-/// Coordinates in the order x₀ … x₅, y₀ … y₅, z₀ … z₅.
+/// The coordinates in the order x₀ … x₅, y₀ … y₅, z₀ … z₅.
 pub struct Planets {
     pub g: f64,
     pub m: [f64; 6],
@@ -129,7 +129,7 @@ impl Coupled<2> for DoublePendulum {
     }
 }
 
-/// Moments `a`, `a`, `c`, weight times distance `w`; coordinates φ, θ, ψ.
+/// Moments of inertia `a`, `a`, `c`, weight times distance `w`; coordinates φ, θ, ψ.
 pub struct HeavyTop {
     pub a: f64,
     pub c: f64,

@@ -1,19 +1,19 @@
-//! q̈ = a(q, q̇): accelerations are the only unknowns.
+//! Equations q̈ = a(q, q̇), with the accelerations as the only unknowns.
 
 use super::lanes::Quad;
 use super::tables::{Tables, largest, product, weighted};
 use super::{MAX_ITERATIONS, add, is_converged};
 use pulp::x86::V3;
 
-/// A model.
+/// The equations of a model.
 pub trait SecondOrder<const N: usize> {
-    /// Whether accelerations depend on velocities.
+    /// Whether the accelerations depend on the velocities.
     const BY_VELOCITY: bool = false;
 
     fn acceleration(&self, q: &[Quad; N], v: &[Quad; N]) -> [Quad; N];
 }
 
-/// Steps of one length.
+/// A stepper with constant step size.
 pub struct SecondOrderStepper<F, const N: usize, const K: usize, const C: usize> {
     isa: V3,
     model: F,
@@ -23,7 +23,7 @@ pub struct SecondOrderStepper<F, const N: usize, const K: usize, const C: usize>
     v: [f64; N],
     q_low: [f64; N],
     v_low: [f64; N],
-    /// Of the last step.
+    /// The iterations of the last step.
     accelerations: [[[f64; 4]; C]; N],
     is_warm: bool,
     pub iterations: u64,
@@ -48,7 +48,8 @@ impl<F: SecondOrder<N>, const N: usize, const K: usize, const C: usize>
         }
     }
 
-    /// What changes of accelerations are measured by: of velocities h |δa| over them, of positions h² |δa|/2.
+    /// The scale for changes of the accelerations δa: they change velocities by h |δa| and positions by h² |δa|/2, each
+    /// relative to its size.
     #[inline(always)]
     fn scale(&self, accelerations: &[[Quad; C]; N], speed: f64, distance: f64) -> f64 {
         let h = self.h.abs();
@@ -56,7 +57,7 @@ impl<F: SecondOrder<N>, const N: usize, const K: usize, const C: usize>
         (speed / h).min(2.0 * distance.max(h * speed) / (h * h))
     }
 
-    /// One step; false if it failed.
+    /// Makes one step; returns false if it failed.
     pub fn advance(&mut self) -> bool {
         let isa = self.isa;
         isa.vectorize(Step(self))
@@ -125,7 +126,7 @@ impl<F: SecondOrder<N>, const N: usize, const K: usize, const C: usize>
                 }
             }
             iterations += 1;
-            // Without velocities nothing has extrapolated the accelerations before the first iteration.
+            // Without velocities, the accelerations have not been extrapolated before the first iteration yet.
             if iterations > 1 {
                 let changed = changed.largest_lane();
                 if is_converged(changed, last, scale) {

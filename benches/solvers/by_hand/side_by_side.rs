@@ -1,4 +1,4 @@
-//! q̈ = a(q) of eight trajectories side by side, in two registers of four.
+//! Equations q̈ = a(q) for eight trajectories at once, in two registers of four.
 
 use super::lanes::Quad;
 use super::second_order::SecondOrder;
@@ -6,13 +6,13 @@ use super::tables::Coefficients;
 use super::{MAX_ITERATIONS, TOLERANCE, is_converged};
 use pulp::x86::V3;
 
-/// A number of each trajectory.
+/// One number for each trajectory.
 type Eight = [[f64; 4]; 2];
 
-/// Trajectories side by side.
+/// The number of trajectories.
 pub const LANES: usize = 8;
 
-/// Steps of one length, for accelerations that do not depend on velocities.
+/// A stepper with constant step size for accelerations that do not depend on velocities.
 pub struct SideBySide<F, const N: usize, const K: usize> {
     isa: V3,
     model: F,
@@ -22,13 +22,13 @@ pub struct SideBySide<F, const N: usize, const K: usize> {
     v: [Eight; N],
     q_low: [Eight; N],
     v_low: [Eight; N],
-    /// Of the last step.
+    /// The iterations of the last step.
     accelerations: [[Eight; N]; K],
     is_warm: bool,
 }
 
 impl<F: SecondOrder<N>, const N: usize, const K: usize> SideBySide<F, N, K> {
-    /// At rest at zero.
+    /// All trajectories at rest at zero.
     pub fn new(isa: V3, model: F, h: f64) -> Self {
         let zero = [[[0.0; 4]; 2]; N];
         Self {
@@ -45,7 +45,7 @@ impl<F: SecondOrder<N>, const N: usize, const K: usize> SideBySide<F, N, K> {
         }
     }
 
-    /// Begins anew, with coordinates and velocities of each trajectory.
+    /// Restarts with coordinates and velocities of each trajectory.
     pub fn start(&mut self, starts: &[([f64; N], [f64; N]); LANES]) {
         for (lane, (q, v)) in starts.iter().enumerate() {
             for a in 0..N {
@@ -57,18 +57,18 @@ impl<F: SecondOrder<N>, const N: usize, const K: usize> SideBySide<F, N, K> {
         (self.q_low, self.v_low, self.is_warm) = (zero, zero, false);
     }
 
-    /// The coordinates of a trajectory.
+    /// The coordinates of one trajectory.
     pub fn coordinates(&self, lane: usize) -> [f64; N] {
         self.q.map(|q| q[lane / 4][lane % 4])
     }
 
-    /// One step; false if it failed for one of them.
+    /// Makes one step; returns false if it failed for one of the trajectories.
     pub fn advance(&mut self) -> bool {
         let isa = self.isa;
         isa.vectorize(Step(self))
     }
 
-    /// What changes of accelerations are measured by, as for a single trajectory.
+    /// The scale for changes of the accelerations, as for a single trajectory.
     #[inline(always)]
     fn scale(&self, like: Quad, half: usize) -> Quad {
         let (h, mut size) = (like.splat(self.h.abs()), like.splat(0.0));
@@ -85,11 +85,11 @@ impl<F: SecondOrder<N>, const N: usize, const K: usize> SideBySide<F, N, K> {
         (speed / h).smaller(position)
     }
 
-    /// Products of a matrix with the accelerations.
+    /// The products of a matrix with the accelerations.
     #[inline(always)]
     fn product(&self, like: Quad, matrix: &[[f64; K]; K], products: &mut [[[Quad; 2]; N]; K]) {
         for a in 0..N {
-            // As many lines at once as their sums fit into registers.
+            // As many rows at once as have room for their sums in registers.
             for from in (0..K).step_by(4) {
                 let mut sums = [[like.splat(0.0); 2]; 4];
                 for j in 0..K {
@@ -152,7 +152,7 @@ impl<F: SecondOrder<N>, const N: usize, const K: usize> SideBySide<F, N, K> {
                 }
             }
             iterations += 1;
-            // Nothing has extrapolated the accelerations before the first iteration.
+            // The accelerations have not been extrapolated before the first iteration yet.
             if iterations > 1 {
                 if are_converged(changed, last, scale) {
                     break;
@@ -187,7 +187,7 @@ impl<F: SecondOrder<N>, const N: usize, const K: usize> SideBySide<F, N, K> {
     }
 }
 
-/// Whether all eight have.
+/// Whether a condition holds for all eight.
 #[inline(always)]
 fn are_converged(size: [Quad; 2], last: [Quad; 2], scale: [Quad; 2]) -> bool {
     let like = size[0];
@@ -211,7 +211,7 @@ fn are_converged(size: [Quad; 2], last: [Quad; 2], scale: [Quad; 2]) -> bool {
     all
 }
 
-/// Adds to numbers that carry what rounding took from them.
+/// Adds to numbers with compensation: the carries keep what rounding lost.
 #[inline(always)]
 fn add<const N: usize>(
     like: Quad,

@@ -1,16 +1,16 @@
-//! Tables of a Gauss element of K points, and in C registers.
+//! The tables of a Gauss element with K points, as numbers and in C registers.
 
 use super::lanes::Quad;
 use tfe::prelude::Element;
 use tfe::runtime::scheme::{SchemeTable, Tables as _};
 
-/// The coefficients of a Gauss element of K points.
+/// The coefficients of a Gauss element with K points.
 pub struct Coefficients<const K: usize> {
     pub once: [[f64; K]; K],
     pub twice: [[f64; K]; K],
-    /// From the rates of the last element to those of this one.
+    /// Extrapolates the rates of the last element to this one.
     pub start: [[f64; K]; K],
-    /// A² times this.
+    /// A² times the extrapolation.
     pub start_twice: [[f64; K]; K],
     pub nodes: [f64; K],
     pub weights: [f64; K],
@@ -19,7 +19,7 @@ pub struct Coefficients<const K: usize> {
 }
 
 impl<const K: usize> Coefficients<K> {
-    /// Of `Mixed` with K points.
+    /// The coefficients of `Mixed` with K points.
     pub fn new() -> Self {
         let table = SchemeTable::new(Element::mixed(K + 1)).expect("a valid element");
         let view = table.view();
@@ -66,10 +66,10 @@ impl<const K: usize> Coefficients<K> {
     }
 }
 
-/// A matrix by columns, its rows in registers.
+/// A matrix by columns, each column in registers.
 pub type Matrix<const K: usize, const C: usize> = [[[f64; 4]; C]; K];
 
-/// The same with all points of a trajectory in registers.
+/// The coefficients, with all points of a trajectory in registers.
 pub struct Tables<const K: usize, const C: usize> {
     pub once: Matrix<K, C>,
     pub twice: Matrix<K, C>,
@@ -81,7 +81,7 @@ pub struct Tables<const K: usize, const C: usize> {
 }
 
 impl<const K: usize, const C: usize> Tables<K, C> {
-    /// Of `Mixed` with K points.
+    /// The coefficients of `Mixed` with K points.
     pub fn new() -> Self {
         let of = Coefficients::<K>::new();
         Self {
@@ -96,7 +96,7 @@ impl<const K: usize, const C: usize> Tables<K, C> {
     }
 }
 
-/// Lanes beyond the last point are copies of it in matrices, zeros in rows.
+/// Lanes beyond the last point are copies of it in matrices, and zero in rows.
 fn columns<const K: usize, const C: usize>(matrix: &[[f64; K]; K]) -> Matrix<K, C> {
     let mut columns = [[[0.0; 4]; C]; K];
     for j in 0..K {
@@ -115,14 +115,14 @@ fn row<const C: usize>(numbers: &[f64]) -> [[f64; 4]; C] {
     row
 }
 
-/// Matrix times vector.
+/// The product of a matrix and a vector.
 #[inline(always)]
 pub fn product<const K: usize, const C: usize>(
     matrix: &Matrix<K, C>,
     vector: &[Quad; C],
 ) -> [Quad; C] {
     let like = vector[0];
-    // Two sums, so that half of the additions wait for each other.
+    // Two sums, so that only half of the additions wait for each other.
     let mut sums = [[like; C]; 2];
     for j in 0..K {
         let factor = like.splat(vector[j / 4].lanes()[j % 4]);
@@ -152,7 +152,7 @@ pub fn weighted<const C: usize>(weights: &[[f64; 4]; C], values: &[Quad; C]) -> 
     sum.sum_of_lanes()
 }
 
-/// The largest magnitude.
+/// The largest absolute value.
 #[inline(always)]
 pub fn largest<const N: usize, const C: usize>(values: &[[Quad; C]; N]) -> f64 {
     let mut largest = values[0][0].abs();
