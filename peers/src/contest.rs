@@ -1,4 +1,4 @@
-//! All peers with all settings beside our elements.
+//! All peers with all of their settings, to be compared with our elements.
 
 use crate::run::{Outcome, Problem, de, diffsol, fixed, ode_solvers};
 use crate::scenes::Start;
@@ -7,26 +7,26 @@ use tfe::State;
 use tfe::prelude::WorkPrecision;
 use tfe::work_precision::PeerRun;
 
-/// Tolerances by factors of √10.
+/// Tolerances, a factor of √10 apart.
 fn tolerances(finest: i32) -> impl Iterator<Item = f64> {
     (6..=2 * finest).map(|k| 10.0_f64.powf(-0.5 * f64::from(k)))
 }
 
-/// Numbers of steps by factors of √2.
+/// Numbers of steps, a factor of √2 apart.
 fn steps(most: f64) -> impl Iterator<Item = f64> {
     let counts = (6..).map(|k| 2.0_f64.powf(0.5 * f64::from(k)).round());
     counts.take_while(move |count| *count <= most)
 }
 
-/// Which peers run.
+/// Which peers take part.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Field {
     All,
-    /// Those for stiff equations: an explicit method would need millions of steps.
+    /// Those for stiff equations: explicit methods would need millions of steps.
     Implicit,
 }
 
-/// Adds the peers to a problem. `momenta` gives the state of coordinates and velocities.
+/// Adds the peers to a problem. `momenta` converts coordinates and velocities into the state.
 pub fn contest<'m, M, S, const N: usize, const D: usize>(
     ours: WorkPrecision<'m, M, State<N>>,
     system: &'m S,
@@ -87,7 +87,7 @@ where
         .into_iter()
         .filter(|_| S::SEPARABLE && field == Field::All)
     {
-        // As much work as the finest tolerances of the others do, and more.
+        // At least as much work as the others do with their smallest tolerances.
         let most = 1e6 / evaluations;
         ours = with(ours, name, steps(most).collect(), method);
     }

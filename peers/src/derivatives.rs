@@ -1,4 +1,4 @@
-//! Derivatives by parameters beside those of `diffsol`: forwards and backwards.
+//! Derivatives with respect to parameters compared with those of `diffsol`: forward and adjoint.
 
 use crate::ways::{self, Way, Ways};
 use diffsol::{
@@ -14,15 +14,15 @@ const N: usize = 12;
 const PARAMETERS: usize = 3 * N;
 const END: f64 = 20.0;
 const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
-/// The ratio of times, ours to theirs, that is aimed at.
+/// The ratio of times, ours to theirs, that we aim at.
 const AIM: f64 = 0.5;
 
-/// What the page says above the table.
-pub const EXPLANATION: &str = "The gradient of ½ q₁² at t = 20 by the 36 parameters of twelve masses in a row with springs of a cubic force and friction: forwards (derivatives of the whole state), and \
-     backwards. Errors are relative to the largest derivative. The fastest run of each side that reaches the error; diffsol with products of Jacobians and of derivatives by parameters written by hand, its \
-     derivatives in or outside its control of errors, whichever is faster.";
+/// The text above the table of the page.
+pub const EXPLANATION: &str = "The gradient of ½ q₁² at t = 20 by the 36 parameters of twelve masses in a row, with friction and springs of cubic force: forward (derivatives of the whole state) and \
+     backward (adjoint). Errors are relative to the largest derivative. The table shows the fastest run of each side that reaches the error. The products with the Jacobians that diffsol needs are written by hand, and its \
+     derivatives are included in its error control or not, whichever is faster.";
 
-/// Twelve masses on springs of a cubic force, each with its own mass, stiffness and damping.
+/// Twelve masses on springs with a cubic force; each has its own mass, stiffness and damping.
 #[dynamics(
     coordinates(q[12]),
     lagrangian = sum(i in 0..12, m[i]/2*dot(q[i])^2) - k[0]/2*q[0]^2 - sum(i in 1..12, k[i]/2*(q[i] - q[i-1])^2 + (q[i] - q[i-1])^4/4),
@@ -40,12 +40,13 @@ fn spring(k: f64, stretch: f64) -> (f64, f64) {
     (stretch * (k + square), k + 3.0 * square)
 }
 
-/// Stretches: the first spring is to the wall and linear.
+/// The elongations of the springs; the first one is attached to the wall, and linear.
 fn stretch(q: &[f64], i: usize) -> f64 {
     if i == 0 { q[0] } else { q[i] - q[i - 1] }
 }
 
-/// Forces without friction along a change: f(q) with `of` the force or its derivative times a change.
+/// The forces without friction, or their change in a direction: `of` is the force of a spring, or its derivative times
+/// the change of its elongation.
 fn add_springs(forces: &mut [f64], of: impl Fn(usize) -> f64) {
     for i in 0..N {
         let force = of(i);
@@ -114,7 +115,7 @@ fn transposed(y: &[f64], p: &[f64], _: f64, w: &[f64], out: &mut [f64]) {
     }
     let (dq, dv) = out.split_at_mut(N);
     dq.fill(0.0);
-    // Minus that of springs, whose matrix is symmetric.
+    // Minus that of the springs, whose matrix is symmetric.
     add_springs(dq, |i| -force_of(p, q, i).1 * stretch(&seeds, i));
     for i in 0..N {
         dv[i] = p[2 * N + i] * seeds[i] - wq[i];
@@ -155,7 +156,7 @@ type LU = NalgebraLU<f64>;
 type Gradient = [f64; PARAMETERS];
 type Found = Result<(f64, Gradient), Box<dyn Error>>;
 
-/// A problem of the peer with tolerances, by one of the two kinds of derivatives.
+/// A problem for the peer with tolerances, and one of the two kinds of derivatives.
 macro_rules! problem {
     ($tolerance:expr, $controlled:expr, $kind:ident) => {{
         let chain = model();
@@ -305,14 +306,14 @@ fn ours(is_backwards: bool, known: &Gradient) -> Vec<Way<'_>> {
     ways
 }
 
-/// The largest difference over the largest derivative; NaN where there is one.
+/// The largest difference divided by the largest derivative; NaN if there is one.
 fn error(found: &Gradient, known: &Gradient) -> f64 {
     let largest = known.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let apart = found.iter().zip(known).map(|(a, b)| (a - b).abs());
     apart.max_by(f64::total_cmp).unwrap_or(f64::NAN) / largest
 }
 
-/// The seconds and the error of a way that has not failed.
+/// The seconds and the error of a setting that has not failed.
 fn measured(found: Found, known: &Gradient) -> Option<(f64, f64)> {
     let (seconds, gradient) = found.ok()?;
     Some((seconds, error(&gradient, known)))
@@ -329,7 +330,7 @@ pub const HEADER: [&str; 7] = [
     "ratio",
 ];
 
-/// A row for each way and target.
+/// A row for each kind of derivatives and each error to be reached.
 pub fn table() -> Result<Vec<[String; 7]>, Box<dyn Error>> {
     let reference = |steps: u32| -> Result<Gradient, Box<dyn Error>> {
         let chain = model();

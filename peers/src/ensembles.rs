@@ -1,4 +1,4 @@
-//! Thousands of starts: side by side with ours, one by one with any.
+//! Thousands of initial states: our ensemble (lanes) and single runs of all.
 
 use crate::run::{Problem, Run, de, fixed, ode_solvers};
 use crate::scenes::Start;
@@ -11,11 +11,11 @@ use std::time::Instant;
 use tfe::prelude::*;
 
 const STARTS: usize = 4096;
-/// Every so manieth start is in the run that finds the fastest settings.
+/// The fastest settings are searched with every `EVERY`-th initial state only.
 const EVERY: usize = 8;
 const REPETITIONS: usize = 7;
 const TARGETS: [f64; 3] = [1e-4, 1e-6, 1e-10];
-/// Ratios of times, ours to theirs, that are aimed at.
+/// The ratios of times, ours to theirs, that we aim at.
 const AIM: f64 = 1.0 / 3.0;
 
 /// The columns.
@@ -31,20 +31,20 @@ pub const HEADER: [&str; 9] = [
     "ratio",
 ];
 
-/// What the page says above the table.
+/// The text above the table of the page.
 pub fn explanation() -> String {
     format!(
-        "The error is the largest at the end of any start, relative to the largest state of all. One by one: the faster of ours and of the \
+        "The error is the largest one at the end over all initial states, relative to the largest state of all. “One by one” is the fastest of ours and of the \
          peers, on one processor; times of peers are those of their steps alone. Then `Ensemble` in lanes on one processor, and on all \
-         ({} here). The aim is a third of the time one by one.",
+         processors ({} here). We aim at a third of the time one by one.",
         rayon::current_num_threads()
     )
 }
 
-/// Element, step, tolerance.
+/// Element, step size, tolerance.
 type Setting = (Element, f64, f64);
 
-/// Many motions of one model, with unit masses: momenta are velocities.
+/// Many motions of one model with unit masses, so that momenta are velocities.
 struct Crowd<'m, M, const N: usize> {
     model: &'m M,
     starts: Vec<State<N>>,
@@ -52,10 +52,10 @@ struct Crowd<'m, M, const N: usize> {
     end: f64,
 }
 
-/// A way to run all of them: what it is called, and its seconds and error.
+/// A setting: its name, its seconds and its error.
 struct Way<'w> {
     name: String,
-    /// With every so manieth start.
+    /// With the n-th initial states only.
     run: Box<dyn Fn(usize) -> Option<(f64, f64)> + 'w>,
 }
 
@@ -63,7 +63,7 @@ impl<'m, M, const N: usize> Crowd<'m, M, N>
 where
     M: Model<N> + Sync,
 {
-    /// With ends that are known by far shorter steps.
+    /// With the exact ends, from runs with far shorter steps.
     fn new(
         model: &'m M,
         start: impl Fn(f64) -> State<N>,
@@ -89,7 +89,7 @@ where
         0.0..self.end
     }
 
-    /// The largest error of every so manieth end.
+    /// The largest error of every n-th end.
     fn error(&self, ends: impl Iterator<Item = State<N>>, every: usize) -> f64 {
         let norm = |x: &[f64; N]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
         let (mut scale, mut error) = ([0.0_f64; 2], [0.0_f64; 2]);
@@ -131,7 +131,7 @@ where
 
     fn one_by_one(&self, (element, step, tolerance): Setting, every: usize) -> Option<(f64, f64)> {
         let simulation = Simulation::new(self.model).element(element).step(step);
-        // The ends alone, as from an ensemble.
+        // Only the end states, as an ensemble returns them.
         let simulation = simulation.tolerance(tolerance).record_every(usize::MAX);
         let mut ends = Vec::with_capacity(self.starts.len() / every);
         let clock = Instant::now();
@@ -171,7 +171,7 @@ where
     }
 }
 
-/// What is tried of ours.
+/// Our settings that are tried.
 fn settings() -> Vec<Setting> {
     let elements = [
         Element::primal(5).reduced(),
@@ -196,7 +196,8 @@ fn name((element, step, tolerance): Setting) -> String {
     format!("{element}, {step}, {tolerance:.0e}")
 }
 
-/// The fastest way to an error, by a part of the starts, then by all of them: its place and seconds.
+/// The fastest setting that reaches an error, first with a part of the initial states and then with all of them: its
+/// index and seconds.
 fn fastest(ways: &[Way<'_>], looks: &[Option<(f64, f64)>], target: f64) -> Option<(usize, f64)> {
     let good = |look: &Option<(f64, f64)>| look.filter(|(_, error)| *error <= target);
     let places = looks.iter().enumerate();
@@ -207,7 +208,7 @@ fn fastest(ways: &[Way<'_>], looks: &[Option<(f64, f64)>], target: f64) -> Optio
     let mut best: Option<(usize, f64)> = None;
     let mut tried = 0;
     for (_, k) in found {
-        // The part may have been lucky, or its time unlucky.
+        // The part may have been lucky, or its time unlucky: verify with all of them.
         let runs: Option<Vec<_>> = (0..REPETITIONS).map(|_| (ways[k].run)(1)).collect();
         let Some(runs) = runs.filter(|runs| runs.iter().all(|(_, error)| *error <= target)) else {
             continue;
@@ -224,7 +225,7 @@ fn fastest(ways: &[Way<'_>], looks: &[Option<(f64, f64)>], target: f64) -> Optio
     best
 }
 
-/// A row for every target.
+/// A row for each error to be reached.
 fn rows<M, S, const N: usize, const D: usize>(
     title: &str,
     crowd: &Crowd<'_, M, N>,
@@ -315,7 +316,7 @@ where
     Ok(TARGETS.map(row).into())
 }
 
-/// The pendulum from rest at all angles up to 2.5, and Hénon and Heiles' stars on as many orbits.
+/// The pendulum from rest at angles up to 2.5, and the Hénon–Heiles system on as many orbits.
 pub fn table() -> Result<Vec<[String; 9]>, Box<dyn Error>> {
     let pendulum = Crowd::new(
         &PENDULUM,
@@ -339,7 +340,7 @@ pub fn table() -> Result<Vec<[String; 9]>, Box<dyn Error>> {
     Ok(all)
 }
 
-/// A printed line.
+/// A line of the printed table.
 pub fn line(row: &[impl AsRef<str>; 9]) -> String {
     let [a, b, c, d, e, f, g, h, i] = row.each_ref().map(AsRef::as_ref);
     format!("{a:<14} {b:>5}  {c:<44} {d:>12}  {e:<36} {f:>12} {g:>11} {h:>12} {i:>11}")

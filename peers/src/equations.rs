@@ -1,4 +1,5 @@
-//! The equations of the scenes, each as cheap as by hand they can be: shared sines, symmetric sums over pairs, no allocation.
+//! The equations of motion of the scenes, written by hand as efficiently as possible: shared sines, symmetric sums over
+//! pairs, no allocation.
 
 use crate::scenes::lattice::Lattice;
 use crate::scenes::oscillators::{DoublePendulum, HenonHeiles, Pendulum, VanDerPol};
@@ -81,7 +82,7 @@ impl System<2> for DoublePendulum {
         let (ds, dc) = (c * turn, -s * turn);
         let df = -2.0 * v[1] * s * dv[1] - v[1] * v[1] * ds - 2.0 * self.g * ca * dq[0];
         let dk = 2.0 * v[0] * s * dv[0] + v[0] * v[0] * ds - self.g * cb * dq[1];
-        // The determinant 2 − c² changes by −2 c dc.
+        // The derivative of the determinant 2 − c² is −2 c dc.
         let relative = 2.0 * c * dc * inverse;
         [
             (df - c * dk - dc * k) * inverse + (f - c * k) * inverse * relative,
@@ -90,7 +91,7 @@ impl System<2> for DoublePendulum {
     }
 }
 
-/// x, y, z of each body, days in thousands.
+/// x, y, z of each body; the unit of time is a thousand days.
 impl System<18> for Bodies {
     const SEPARABLE: bool = true;
     const UNIT: f64 = 1000.0;
@@ -141,7 +142,7 @@ impl System<18> for Bodies {
         a
     }
 
-    /// Distances and velocities of Jupiter and beyond; those of the Sun are taken as well as theirs.
+    /// The distances and velocities of Jupiter and the outer planets; the Sun, which moves little, gets theirs too.
     fn sizes(&self) -> ([f64; 18], [f64; 18]) {
         ([10.0; 18], [5.0; 18])
     }

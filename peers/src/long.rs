@@ -1,4 +1,4 @@
-//! A lattice of 1024 sites: a model of run-time length beside the peers.
+//! A lattice of 1024 sites: a model of run-time length compared with the peers.
 
 use crate::run::{Problem, Run, de, fixed, ode_solvers};
 use crate::scenes::Start;
@@ -13,14 +13,14 @@ const SITES: usize = 1024;
 const COMPONENTS: usize = 2 * SITES;
 const END: f64 = 100.0;
 const TARGETS: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
-/// The ratio of times, ours to theirs, that is aimed at.
+/// The ratio of times, ours to theirs, that we aim at.
 const AIM: f64 = 0.5;
 
-/// What the page says above the table.
-pub const EXPLANATION: &str = "The lattice of Fermi, Pasta, Ulam and Tsingou with 1024 free sites, to t = 100: ours is a declaration of run-time length, whose steps keep nothing on \
-     the way; errors at the end are relative to the largest state. The fastest run of each side that reaches the error; the aim is half of the time of the peer.";
+/// The text above the table of the page.
+pub const EXPLANATION: &str = "The lattice of Fermi, Pasta, Ulam and Tsingou with 1024 free sites, to t = 100. Ours is a model of run-time length, which records nothing on \
+     the way. Errors at the end are relative to the largest state. The table shows the fastest run of each side that reaches the error; we aim at half of the time of the peer.";
 
-/// Unit masses with free ends, springs of force δ + a δ².
+/// Unit masses with free ends, joined by springs of force δ + a δ².
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + a/3*(q[i+1]-q[i])^3),
@@ -32,7 +32,7 @@ struct Fput {
 
 const A: f64 = 0.25;
 
-/// The same by hand.
+/// The same equations by hand.
 struct ByHand;
 
 impl System<SITES> for ByHand {
@@ -52,7 +52,7 @@ impl System<SITES> for ByHand {
         a
     }
 
-    // Only implicit methods ask; none takes part.
+    // Only implicit methods use it, and none takes part.
     fn variation(
         &self,
         q: &[f64; SITES],
@@ -92,7 +92,7 @@ fn error(q: &[f64], v: &[f64], known: &FamilyNode) -> f64 {
             .iter()
             .zip(other)
             .map(|(one, other)| (one - other).abs());
-        // A NaN is the largest of all.
+        // A NaN counts as the largest.
         differences.max_by(f64::total_cmp).unwrap_or(f64::NAN)
     };
     let (q, v) = (
@@ -183,7 +183,7 @@ pub const HEADER: [&str; 7] = [
     "ratio",
 ];
 
-/// A row for every target.
+/// A row for each error to be reached.
 pub fn table() -> Result<Vec<[String; 7]>, Box<dyn Error>> {
     let fput = Fput { n: SITES, a: A };
     let start = start();

@@ -1,5 +1,6 @@
-//! Speed and accuracy beside other crates: the scenes of the example `speed_accuracy` with our elements and with other integrators, in one
-//! run and by one clock.
+//! Speed and accuracy compared with other crates: the scenes of the example `speed_accuracy` with our elements and with
+//! other integrators, in one program and by one clock. The printed tables and the page say which side reaches an error
+//! in less time, and by how much.
 //!
 //! ```sh
 //! cargo run --release -p tfe-peers             # pictures, tables and a page in target/speed_accuracy
@@ -42,7 +43,7 @@ use tfe::work_precision::WorkPrecisionError;
 
 type Run = fn() -> Result<Scene, WorkPrecisionError>;
 
-/// One after the other, because they measure time. With the ratio of times, ours to theirs, that is aimed at.
+/// The scenes, one after the other because times are measured, with the ratio of times, ours to theirs, that we aim at.
 const SCENES: [(&str, f64, Run); 8] = [
     ("pendulum", 0.5, || {
         let state = |q, v| one::PENDULUM.state(q, v);
@@ -166,7 +167,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let overview = overview::overview(&scenes);
     fs::write(folder.join("overview.svg"), &overview)?;
     fs::write(folder.join("peers.csv"), table::csv(table::HEADER, &rows))?;
-    let summary = Section::new("Our elements beside other crates")
+    let summary = Section::new("Our elements compared with other crates")
         .paragraph(table::EXPLANATION)
         .figure(overview, "All scenes")
         .table(table::HEADER, rows);

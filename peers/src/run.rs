@@ -1,4 +1,4 @@
-//! One run of each peer, timed without what comes before its first step, and without output on the way.
+//! One run of each peer. It is timed without the preparation before its first step, and has no output in between.
 
 pub mod de;
 pub mod diffsol;
@@ -10,7 +10,7 @@ use crate::system::System;
 use std::error::Error;
 use std::time::Duration;
 
-/// Where a run ended (y), how long it took and how often it evaluated the equations.
+/// The end state y of a run, its time and its number of evaluations of the equations.
 pub struct Run<const D: usize> {
     pub y: [f64; D],
     pub time: Duration,
@@ -19,12 +19,12 @@ pub struct Run<const D: usize> {
 
 pub type Outcome<const D: usize> = Result<Run<D>, Box<dyn Error>>;
 
-/// A system with its start, in its units of time. `D` is twice `N`.
+/// A system with its initial state, in its unit of time. `D` is twice `N`.
 pub struct Problem<'s, S, const N: usize, const D: usize> {
     pub system: &'s S,
     pub y: [f64; D],
     pub end: f64,
-    /// How large each component becomes: what one tolerance is relative to.
+    /// The size that each component reaches, to which the tolerance is relative.
     pub sizes: [f64; D],
 }
 
@@ -45,7 +45,7 @@ impl<'s, S: System<N>, const N: usize, const D: usize> Problem<'s, S, N, D> {
         }
     }
 
-    /// Coordinates and velocities in the scene's units.
+    /// Coordinates and velocities in the units of the scene.
     pub fn motion(&self, y: &[f64; D]) -> ([f64; N], [f64; N]) {
         let (mut q, mut v) = ([0.0; N], [0.0; N]);
         for i in 0..N {

@@ -1,4 +1,5 @@
-//! Stiff scenes: two in which accuracy does not need the steps that stability of an explicit method would.
+//! Stiff scenes: in two of them, accuracy does not require the short steps that the stability of an explicit method
+//! would.
 
 use crate::contest::{Field, contest};
 use crate::run::{Problem, de};
@@ -14,22 +15,23 @@ use tfe::work_precision::Measurements;
 
 const TARGETS: [f64; 4] = [1e-2, 1e-4, 1e-6, 1e-8];
 
-/// Errors that `accuracy` is told.
+/// The accuracies asked for.
 const CHOSEN: [f64; 4] = [1e-4, 1e-6, 1e-8, 1e-10];
 
-/// Position and velocity of van der Pol's oscillator at the end, by the test set for initial value problems (`vdpol`).
+/// Position and velocity of van der Pol's oscillator at the end, from the test set for initial value problems
+/// (`vdpol`).
 const END: ([f64; 1], [f64; 1]) = ([1.706_167_732_170_483], [-0.892_809_701_024_797_5e-3]);
 
-/// What the page says above the table.
+/// The text above the table of the page.
 pub const EXPLANATION: &str = "Van der Pol's oscillator with μ = 1000 from (2, 0) to t = 2000, and the pendulum on a \
      spring of k = 10⁸ from rest at 1.5 radians to t = 10.00016, where the spring's momentum is largest; peers for stiff equations \
-     only. Of van der Pol's oscillator four rows each: equal steps; a mesh that halves towards both jumps, whose times were found \
-     beforehand by a peer, which is knowledge that no user has; what `accuracy` does when it is told the error alone, all its runs \
-     together; and its last run alone, with the element, the steps and the tolerance that it picked. The ratio is our time to theirs.";
+     only. For van der Pol's oscillator there are four rows for each error: equal steps; a mesh refined towards both jumps, whose times were found \
+     beforehand by a peer, which a user could not know; `accuracy` given only the error, with the time of all its runs \
+     together; and its last run alone, with the element, the steps and the tolerance that it chose. The ratio is our time to theirs.";
 
 type Row = [String; 10];
 
-/// A run to the end.
+/// Runs to the end.
 type Chosen<'r> = &'r dyn Fn() -> Result<Node<1>, tfe::RunError<1>>;
 
 const MODEL: VanDerPol = VanDerPol { mu: 1000.0 };
@@ -40,7 +42,7 @@ const START: Start<1> = Start {
     end: 2000.0,
 };
 
-/// When x leaves its branch, between these times, to a thousandth of the width of the jump.
+/// The time at which x leaves its branch, between two given times, to a thousandth of the width of the jump.
 fn jump(mut before: f64, mut after: f64) -> Result<f64, Box<dyn Error>> {
     let at = |end: f64| -> Result<f64, Box<dyn Error>> {
         let problem = Problem::<_, 1, 2>::new(&MODEL, &Start { end, ..START });
@@ -58,9 +60,9 @@ fn jump(mut before: f64, mut after: f64) -> Result<f64, Box<dyn Error>> {
     Ok(after)
 }
 
-/// Nodes of segments that halve towards each jump from both sides, down to the width of a jump.
+/// The nodes of segments whose lengths halve towards each jump from both sides, down to the width of a jump.
 fn segments(jumps: &[f64]) -> Vec<f64> {
-    /// Below it the motion is smooth again: a fraction of 1/μ.
+    /// The length of the shortest segment, a fraction of 1/μ: so close to the jump the motion is smooth again.
     const LEAST: f64 = 1e-4;
     let mut nodes = vec![0.0, START.end];
     for (k, jump) in jumps.iter().enumerate() {
@@ -86,7 +88,7 @@ fn segments(jumps: &[f64]) -> Vec<f64> {
     nodes
 }
 
-/// The end with so many elements in each segment, and the time it took.
+/// The end state with a number of elements in each segment, and the time it took.
 fn in_segments(
     element: Element,
     nodes: &[f64],
@@ -107,10 +109,11 @@ fn in_segments(
     Ok((state, clock.elapsed()))
 }
 
-/// Told an accuracy alone: the time of the whole search and that of the run it picks, at each target.
+/// Runs given only an accuracy: the time of the whole search and that of the run chosen, for each error to be reached.
 ///
-/// Errors in this table are relative to the end, where the momentum is a millionth of that in the jumps; what is asked of a run is relative to the largest. So the
-/// first of ε, ε/10, ε/100 is asked that leaves ε here, and shown in the place of the tolerance.
+/// Errors in this table are relative to the state at the end, where the momentum is a millionth of that in the jumps;
+/// the accuracy asked of a run is relative to the largest values. Therefore ε, ε/10, ε/100 are asked for until the
+/// error in the sense of the table is at most ε; the accuracy asked for is shown in the column of the tolerance.
 fn by_accuracy(
     measured: &Measurements,
     (q, p): ([f64; 1], [f64; 1]),
@@ -119,7 +122,7 @@ fn by_accuracy(
     let error = |node: &Node<1>| {
         let error_q = (node.q[0] - q[0]).abs() / 2.0;
         let error_p = (node.p[0] / p[0] - 1.0).abs();
-        // A NaN is the largest of all.
+        // A NaN counts as the largest.
         if error_q.is_nan() || error_q >= error_p {
             error_q
         } else {
@@ -175,7 +178,7 @@ fn by_accuracy(
     Ok(rows)
 }
 
-/// The motion of the largest accuracy that leaves no more than `target`.
+/// The motion for the largest of these accuracies whose error is at most `target`.
 fn first_that_meets(
     target: f64,
     error: &dyn Fn(&Node<1>) -> f64,
@@ -188,10 +191,10 @@ fn first_that_meets(
             return Ok((motion, accuracy));
         }
     }
-    Err(format!("nothing leaves {target:.0e}").into())
+    Err(format!("no accuracy asked for reaches an error of {target:.0e}").into())
 }
 
-/// The fastest peer and the ratio, if any peer reaches the target.
+/// The fastest peer and the ratio of times, if any peer reaches the error.
 fn beside_peer(row: &mut Row, measured: &Measurements, target: f64, seconds: f64) {
     if let Some((peer, point)) = measured.fastest_peer(target)
         && let Some(one) = point.measured()
@@ -252,7 +255,8 @@ fn van_der_pol() -> Result<Vec<Row>, Box<dyn Error>> {
                 for _ in 0..4 {
                     time = time.min(run()?.1);
                 }
-                // Relative to the largest: x = 2, and v = 2 μ/3 in a jump is more than is compared; so to the end's own.
+                // Errors of x are relative to its largest value, 2. For v, the largest value, 2 μ/3 in a jump, would be too large
+                // a scale: its errors are relative to its value at the end.
                 let error_q = (state.q[0] - q[0]).abs() / 2.0;
                 let error_p = (state.p[0] - end.p[0]).abs() / end.p[0].abs();
                 all.push((
@@ -289,12 +293,12 @@ fn elastic_pendulum() -> Result<Vec<Row>, Box<dyn Error>> {
     const START: Start<2> = Start {
         q: [1.0, 1.5],
         v: [0.0, 0.0],
-        // Not 10: there the spring's momentum happens to pass zero, and who leaves its swing out altogether seems to be right. Here it is
-        // largest.
+        // Not t = 10: there the momentum of the spring happens to pass through zero, and a method that damps the
+        // oscillation of the spring altogether would seem to be accurate. Here it is largest.
         end: 10.000_16,
     };
     let start = MODEL.state(START.q, START.v);
-    // Three and six steps for each swing of the spring, with an element of order 14.
+    // Three and six steps per period of the spring, with an element of order 14.
     let fine = |step| {
         let simulation = Simulation::new(&MODEL).element(Mixed::<8>).step(step);
         let motion = simulation
@@ -326,7 +330,7 @@ fn elastic_pendulum() -> Result<Vec<Row>, Box<dyn Error>> {
     ))
 }
 
-/// Rows as of the other scenes.
+/// Rows in the form of the other scenes.
 pub fn table() -> Result<Vec<Row>, Box<dyn Error>> {
     let mut rows = van_der_pol()?;
     rows.extend(elastic_pendulum()?);

@@ -1,11 +1,12 @@
-//! Equations of motion, written by hand.
+//! The interface for equations of motion written by hand.
 
-/// q̈ = a(q, q̇) of `N` coordinates. A peer takes them as y = (q, q̇) of `D = 2 N` components.
+/// q̈ = a(q, q̇) for `N` coordinates. Peers integrate them as y = (q, q̇) with `D = 2 N` components.
 pub trait System<const N: usize> {
-    /// Whether a depends on q alone, as leapfrog wants it.
+    /// Whether a depends on q alone, as leapfrog requires.
     const SEPARABLE: bool = false;
 
-    /// The unit of time, chosen so that coordinates and velocities are about as large: then one absolute tolerance fits both.
+    /// The unit of time, chosen such that coordinates and velocities are of about the same size: then one absolute
+    /// tolerance fits both.
     const UNIT: f64 = 1.0;
 
     /// a(q, q̇) in units of time of [`UNIT`](Self::UNIT).
@@ -14,13 +15,14 @@ pub trait System<const N: usize> {
     /// ∂a/∂q · dq + ∂a/∂q̇ · dv
     fn variation(&self, q: &[f64; N], v: &[f64; N], dq: &[f64; N], dv: &[f64; N]) -> [f64; N];
 
-    /// How large coordinates and velocities become, in these units.
+    /// The sizes that coordinates and velocities reach, in these units.
     fn sizes(&self) -> ([f64; N], [f64; N]) {
         ([1.0; N], [1.0; N])
     }
 }
 
-/// The halves of y: coordinates and velocities. Of 2 N components at least; `None` cannot happen for others in this crate.
+/// The halves of y: coordinates and velocities. `None` if y has fewer than 2 N components, which cannot happen in this
+/// crate.
 fn halves<const N: usize>(y: &[f64]) -> (&[f64; N], &[f64; N]) {
     const NEVER: &str = "y has 2 N components";
     let (q, v) = y.split_at(N);

@@ -1,4 +1,4 @@
-//! Who reaches an error first.
+//! The table of the fastest runs that reach an error.
 
 use crate::runs::{Scene, TARGETS};
 use crate::scenes::short;
@@ -18,20 +18,20 @@ pub const HEADER: [&str; 10] = [
     "ratio",
 ];
 
-/// What the page says above the table.
-pub const EXPLANATION: &str = "For each error the fastest run whose error at the end, relative to the largest state, is no \
-     larger: ours, and that of any peer. Nothing is interpolated: of both sides it is a run that was made. All were made in turn in \
-     one program by one clock, on one processor, the peers with equations written by hand, the times without what comes before the first step; \
-     the setting is a tolerance or a number of steps. The ratio is our time to theirs. The aim is half of theirs or less, a fifth for \
-     the outer solar system: “misses” says where we fail it, “slower” where the peer wins. A “?” stands where a finer setting of the \
-     same curve misses the error: the point is a lucky one.";
+/// The text above the table of the page.
+pub const EXPLANATION: &str = "For each error, the fastest run whose error at the end, relative to the largest state, is not \
+     larger: our fastest, and that of all peers. Nothing is interpolated: both are runs that were made. All runs were made in turn in \
+     one program by one clock, on one processor, the peers with equations written by hand, and times do not include the preparation before the first step; \
+     the setting is a tolerance or a number of steps. The ratio is our time to theirs. We aim at half of theirs or less, at a fifth for \
+     the outer solar system: “misses” says that we miss the aim, “slower” that the peer is faster. A “?” says that a finer setting of the \
+     same curve misses the error: the run was accurate by chance.";
 
-/// A row for each target.
+/// A row for each error to be reached.
 pub fn rows(scene: &Scene, aim: f64) -> Vec<[String; 10]> {
     rows_of(scene.title, &scene.measured, &TARGETS, aim)
 }
 
-/// The same of measurements that are no scene of the example.
+/// The same for measurements that are not a scene of the example.
 pub fn rows_of(
     title: &str,
     measured: &Measurements,
@@ -81,7 +81,7 @@ pub fn rows_of(
     targets.iter().map(row).collect()
 }
 
-/// Whether a shorter step of the same curve misses the error that this point reaches.
+/// Whether a shorter step of the same curve misses the error that this point reaches: it was accurate by chance.
 fn is_luck(measured: &Measurements, point: &Point, target: f64) -> bool {
     let same = |other: &&Point| (other.element, other.solve) == (point.element, point.solve);
     let finer = measured.points().filter(same);
@@ -89,7 +89,7 @@ fn is_luck(measured: &Measurements, point: &Point, target: f64) -> bool {
     finer.any(|other| other.error().is_some_and(|error| error > target))
 }
 
-/// The same of a peer, whose settings are tolerances or else numbers of steps.
+/// The same for a peer, whose settings are tolerances or numbers of steps.
 fn is_luck_of_peer(peer: &Peer, point: &PeerPoint, target: f64) -> bool {
     let is_finer = |other: &&PeerPoint| {
         if point.setting < 1.0 {
@@ -107,7 +107,7 @@ fn chance(is_luck: bool) -> &'static str {
     if is_luck { " ?" } else { "" }
 }
 
-/// A ratio, and whether it is what was aimed at.
+/// A ratio of times, and whether the aim was met.
 pub fn verdict(ratio: f64, aim: f64) -> String {
     let word = if ratio <= aim {
         ""
@@ -123,13 +123,13 @@ pub fn milliseconds(seconds: f64) -> String {
     format!("{:.4} ms", 1e3 * seconds)
 }
 
-/// A printed line.
+/// A line of the printed table.
 pub fn line(row: &[impl AsRef<str>; 10]) -> String {
     let [a, b, c, d, e, f, g, h, i, j] = row.each_ref().map(AsRef::as_ref);
     format!("{a:<26} {b:>5} {c:<26} {d:>6} {e:>9} {f:>10}  {g:<38} {h:>12} {i:>10}  {j}")
 }
 
-/// All rows as a table of commas.
+/// All rows as CSV.
 pub fn csv<const C: usize>(header: [&str; C], rows: &[[String; C]]) -> String {
     let quoted = |row: &[String; C]| {
         let fields = row.each_ref().map(|field| format!("\"{field}\""));

@@ -1,20 +1,20 @@
-//! Ways to a result: of ours and of those of the peers the fastest that reaches an error.
+//! The fastest of our settings, and of those of the peers, that reaches an error.
 
 use crate::table::{milliseconds, verdict};
 
 const REPETITIONS: usize = 7;
 
-/// What it is called, and how it runs: its seconds and its error.
+/// A setting: its name, and a function that runs it and returns its seconds and its error.
 pub struct Way<'w> {
     pub name: String,
     pub run: Box<dyn Fn() -> Option<(f64, f64)> + 'w>,
 }
 
-/// Ways that were looked at.
+/// The settings that were measured.
 pub struct Ways<'w>(Vec<(Way<'w>, Option<(f64, f64)>)>);
 
 impl<'w> Ways<'w> {
-    /// Runs each twice, so that neither side pays for the first look.
+    /// Runs each setting twice, so that neither side is charged for the first run.
     pub fn look_at(ways: Vec<Way<'w>>) -> Self {
         let look = |way: &Way<'_>| {
             let (one, other) = ((way.run)()?, (way.run)()?);
@@ -27,7 +27,7 @@ impl<'w> Ways<'w> {
         Self(looked.collect())
     }
 
-    /// The name of the fastest way to an error, and its seconds, the least of some runs.
+    /// The name of the fastest setting that reaches an error, and its seconds, the smallest of several runs.
     fn fastest(&self, target: f64) -> Option<(&str, f64)> {
         let looked = self.0.iter();
         let mut found: Vec<(f64, &Way<'_>)> = looked
@@ -49,7 +49,8 @@ impl<'w> Ways<'w> {
     }
 }
 
-/// The row of an error: of `what`, ours and theirs, where `aim` is the ratio of times that is aimed at.
+/// The row for an error of `what` with our settings and theirs; `aim` is the ratio of times, ours to theirs, that we
+/// aim at.
 pub fn row(what: &str, target: f64, [ours, peers]: [&Ways<'_>; 2], aim: f64) -> [String; 7] {
     let dash = || "—".to_owned();
     let (one, other) = (ours.fastest(target), peers.fastest(target));
@@ -75,7 +76,7 @@ pub fn row(what: &str, target: f64, [ours, peers]: [&Ways<'_>; 2], aim: f64) -> 
     ]
 }
 
-/// A printed line.
+/// A line of the printed table.
 pub fn line(row: &[impl AsRef<str>; 7]) -> String {
     let [a, b, c, d, e, f, g] = row.each_ref().map(AsRef::as_ref);
     format!("{a:<24} {b:>5}  {c:<40} {d:>12}  {e:<48} {f:>12}  {g}")

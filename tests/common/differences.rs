@@ -1,11 +1,12 @@
-//! Derivatives by differences of eighth order, where no oracle is exact.
+//! Numerical derivatives by central differences of eighth order, for tests in which no exact reference exists.
 
-/// The derivatives of numbers at `x`, over a distance at which roundings of 1e-15 of the values leave some 1e-13 of them.
+/// The derivatives of several numbers with respect to `x`, with a spacing at which rounding errors of 1e-15 in the
+/// values lead to errors of about 1e-13.
 pub fn difference<T: AsMut<[f64]>>(of: impl Fn(f64) -> T, x: f64) -> T {
     difference_over(4e-3 * x.abs().max(0.1), of, x)
 }
 
-/// The same over a distance.
+/// The same with a given spacing.
 pub fn difference_over<T: AsMut<[f64]>>(distance: f64, of: impl Fn(f64) -> T, x: f64) -> T {
     let pair = |k: f64, weight: f64| {
         let (mut high, mut low) = (of(x + k * distance), of(x - k * distance));

@@ -1,4 +1,5 @@
-//! Elements of Gauss points in dual numbers, by a solver of their own: the oracle of derivatives, without differences.
+//! Reference derivatives without differences: elements with Gauss quadrature in dual numbers, with an independent
+//! solver.
 
 #![allow(dead_code)] // each test target uses its part
 
@@ -7,13 +8,13 @@ use tfe::runtime::dual::Dual;
 use tfe::runtime::scheme::{SchemeTable, Tables as _};
 use tfe::runtime::{Element, First, Form, Model};
 
-/// Enough for steps that contract by a factor of four; derivatives converge as values do.
+/// Enough iterations for steps that contract by a factor of four; derivatives converge as fast as values.
 const SWEEPS: usize = 40;
 
-/// Enough for Newton's method from the start of an element, and once more for the derivatives.
+/// Enough iterations for Newton's method from the initial values of an element, with one more for the derivatives.
 const NEWTON: usize = 8;
 
-/// Coordinates and momenta with a derivative.
+/// Coordinates and momenta as dual numbers, each with a derivative.
 #[derive(Clone)]
 pub struct Phase {
     pub q: Vec<Dual>,
@@ -21,7 +22,7 @@ pub struct Phase {
 }
 
 impl Phase {
-    /// A start, which moves along one column of a matrix ordered (p, q), or along none.
+    /// An initial state, whose derivative is one column of a matrix ordered (p, q), or zero.
     pub fn along(q: &[f64], p: &[f64], column: Option<usize>) -> Self {
         let n = q.len();
         let part = |values: &[f64], offset: usize| {
@@ -36,7 +37,7 @@ impl Phase {
     }
 }
 
-/// A number without a slope.
+/// A number with derivative zero.
 pub fn number(value: f64) -> Dual {
     Dual::new(value, 0.0)
 }
@@ -58,7 +59,7 @@ pub fn moved(start: &[Dual], h: Dual, weights: &[f64], rates: &[Vec<Dual>]) -> V
     sum
 }
 
-/// x − A⁻¹ r, where r carries derivatives.
+/// x − A⁻¹ r, where r is a vector of dual numbers.
 fn corrected(x: &[Dual], matrix: DMatrix<f64>, residual: &[Dual]) -> Vec<Dual> {
     let factors = matrix.full_piv_lu();
     let part = |of: fn(&Dual) -> f64| {
@@ -70,7 +71,8 @@ fn corrected(x: &[Dual], matrix: DMatrix<f64>, residual: &[Dual]) -> Vec<Dual> {
     x.iter().zip(change).map(|(x, d)| *x - d).collect()
 }
 
-/// The root of as many equations as there are unknowns. Derivatives by the unknowns are slopes, too; those of the data are subtracted.
+/// Solves a system of equations by Newton's method. Derivatives by the unknowns are slopes of dual numbers, too; those
+/// by the data are subtracted first.
 pub fn root(mut x: Vec<Dual>, residual: impl Fn(&[Dual]) -> Vec<Dual>) -> Vec<Dual> {
     for _ in 0..NEWTON {
         let still: Vec<Dual> = x.iter().map(|x| number(x.value)).collect();
@@ -89,7 +91,8 @@ pub fn root(mut x: Vec<Dual>, residual: impl Fn(&[Dual]) -> Vec<Dual>) -> Vec<Du
     x
 }
 
-/// Rates and forces of a model of fixed size at one point, of the momentum there; `rate` is where its velocity is looked for.
+/// The rate and the force of a model of fixed size at one point with its momentum; the search for the velocity starts
+/// at `rate`.
 pub fn flow<M: Model<N>, const N: usize>(
     model: &M,
     time: Dual,
@@ -102,7 +105,7 @@ pub fn flow<M: Model<N>, const N: usize>(
             model.first(time, &q, &array(p), &mut first);
             *rate = first.z.to_vec();
         }
-        // L_v(q, v) = p by Newton's method with the mass matrix in mere numbers.
+        // Newton's method for L_v(q, v) = p, with the mass matrix in ordinary numbers.
         Form::Lagrangian => {
             model.first(time, &q, &array(rate), &mut first);
             let left: Vec<Dual> = first.z.iter().zip(p).map(|(z, p)| *z - *p).collect();
@@ -122,7 +125,7 @@ pub fn flow<M: Model<N>, const N: usize>(
         .collect()
 }
 
-/// The velocity of a momentum.
+/// The velocity that belongs to a momentum.
 pub fn velocity<M: Model<N>, const N: usize>(model: &M, time: Dual, at: &Phase) -> Vec<Dual> {
     let mut rate = vec![number(0.0); N];
     for _ in 0..NEWTON {
@@ -131,7 +134,7 @@ pub fn velocity<M: Model<N>, const N: usize>(model: &M, time: Dual, at: &Phase) 
     rate
 }
 
-/// The end of one element of Gauss points from the time `t` on; `flow` as [`flow`].
+/// The end of one element with Gauss points from the time `t` on; for `flow` see [`flow`].
 pub fn element_end(
     element: Element,
     start: &Phase,
@@ -162,18 +165,18 @@ pub fn element_end(
     }
 }
 
-/// Derivatives found, beside those of runs in dual numbers.
+/// Compares derivatives with those of runs in dual numbers.
 pub struct Beside<'a> {
     /// The state at the start.
     pub start: (&'a [f64], &'a [f64]),
-    /// The end of a run from a start, by a parameter of this index if by any.
+    /// Returns the end of a run from a start, with the derivative by the parameter of this index, if given.
     pub end: &'a dyn Fn(&Phase, Option<usize>) -> Phase,
     off: f64,
     size: f64,
 }
 
 impl<'a> Beside<'a> {
-    /// Nothing compared yet.
+    /// Without any comparison yet.
     pub fn new(
         start: (&'a [f64], &'a [f64]),
         end: &'a dyn Fn(&Phase, Option<usize>) -> Phase,
@@ -186,20 +189,20 @@ impl<'a> Beside<'a> {
         }
     }
 
-    /// The largest difference over the largest derivative.
+    /// The largest difference divided by the largest derivative.
     pub fn off(&self) -> f64 {
         assert!(self.size > 0.0, "nothing was compared");
         self.off / self.size
     }
 
-    /// The derivatives of the end by a parameter.
+    /// Compares the derivatives of the end by a parameter.
     pub fn by_parameter(&mut self, index: usize, q: &[f64], p: &[f64]) {
         let start = Phase::along(self.start.0, self.start.1, None);
         let end = (self.end)(&start, Some(index));
         self.see(q, p, &end);
     }
 
-    /// The derivatives of the end along a column of the matrix by the start, ordered (p, q).
+    /// Compares the derivatives of the end along a column of the matrix by the initial state, ordered (p, q).
     pub fn by_start(&mut self, column: usize, q: &[f64], p: &[f64]) {
         let start = Phase::along(self.start.0, self.start.1, Some(column));
         let end = (self.end)(&start, None);

@@ -1,4 +1,4 @@
-//! Reference tables, and comparisons that say what differs.
+//! Access to tables of reference values, and comparisons with messages that say what differs.
 
 #![allow(dead_code)] // each test target uses its part
 
@@ -10,14 +10,14 @@ use nalgebra::DMatrix;
 use serde_json::Value;
 use std::path::Path;
 
-/// The folder of the workspace: tests belong to the package there, or to one in a folder below.
+/// The folder of the workspace: tests belong to the package there or to one in a folder below.
 fn root() -> &'static Path {
     let mut above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();
     let is_root = |folder: &&Path| folder.join("tests/reference").is_dir();
     above.find(is_root).expect("tests/reference")
 }
 
-/// A table of `tests/reference`.
+/// Reads a table of `tests/reference`.
 pub fn reference(name: &str) -> Value {
     let path = root().join(format!("tests/reference/{name}.json"));
     let at = path.display();
@@ -25,26 +25,26 @@ pub fn reference(name: &str) -> Value {
     serde_json::from_str(&text).unwrap_or_else(|error| panic!("{at}: {error}"))
 }
 
-/// A number of a table.
+/// A number from a table.
 pub fn number(value: &Value) -> f64 {
     value
         .as_f64()
         .unwrap_or_else(|| panic!("{value} is not a number"))
 }
 
-/// A list of a table.
+/// A list from a table.
 pub fn list(value: &Value) -> &[Value] {
     value
         .as_array()
         .unwrap_or_else(|| panic!("{value} is not a list"))
 }
 
-/// A list of numbers.
+/// A list of numbers from a table.
 pub fn numbers(value: &Value) -> Vec<f64> {
     list(value).iter().map(number).collect()
 }
 
-/// A count.
+/// A count from a table.
 pub fn count(value: &Value) -> usize {
     value
         .as_u64()
@@ -52,7 +52,7 @@ pub fn count(value: &Value) -> usize {
         .unwrap_or_else(|| panic!("{value} is not a count"))
 }
 
-/// A word.
+/// A string from a table.
 pub fn word(value: &Value) -> &str {
     value
         .as_str()
@@ -75,7 +75,7 @@ pub fn matrix(value: &Value) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| rows[i][j])
 }
 
-/// Every entry within `tolerance · max(1, |expected|)`.
+/// Asserts that every entry is within `tolerance · max(1, |expected|)` of the expected one.
 #[track_caller]
 pub fn assert_matrix(actual: &DMatrix<f64>, expected: &DMatrix<f64>, tolerance: f64, what: &str) {
     assert_eq!(actual.shape(), expected.shape(), "{what}");
@@ -91,7 +91,7 @@ pub fn assert_matrix(actual: &DMatrix<f64>, expected: &DMatrix<f64>, tolerance: 
     }
 }
 
-/// Every entry within `tolerance`, absolutely.
+/// Asserts that every entry is within `tolerance` of the expected one, absolutely.
 #[track_caller]
 pub fn assert_close(actual: &[f64], expected: &[f64], tolerance: f64, what: &str) {
     assert_eq!(actual.len(), expected.len(), "{what}");
@@ -104,7 +104,7 @@ pub fn assert_close(actual: &[f64], expected: &[f64], tolerance: f64, what: &str
     }
 }
 
-/// The largest difference of two lists of equal length.
+/// The largest difference of corresponding entries of two lists of equal length.
 #[track_caller]
 pub fn distance(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len(), "{a:?} {b:?}");
@@ -114,10 +114,10 @@ pub fn distance(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, larger)
 }
 
-/// The slope of log(error) against log(step) by least squares, over the points above `floor`.
+/// The observed order: the slope of log(error) against log(step) by least squares, over the points above `floor`.
 ///
 /// # Panics
-/// Unless three points are above the floor: fewer say nothing about an order. And where an error is no number.
+/// If fewer than three points are above the floor, which is too few to determine an order, or if an error is NaN.
 #[track_caller]
 pub fn observed_order(points: &[(f64, f64)], floor: f64, what: &str) -> f64 {
     assert!(

@@ -1,14 +1,14 @@
-//! Random numbers of the sizes that users give, and some that they should not.
+//! Random numbers of the sizes that users pass, and of some that they should not.
 
 use tfe::Element;
 
-/// A number in a variable of the environment.
+/// A number from an environment variable.
 pub fn setting(name: &str) -> Option<u32> {
     let text = std::env::var(name).ok()?;
     Some(text.parse().expect("a number"))
 }
 
-/// Numbers that are the same in every run.
+/// A generator that returns the same numbers in every run.
 #[derive(Clone, Copy, Debug)]
 pub struct Random(pub u64);
 
@@ -29,7 +29,7 @@ impl Random {
         (self.unit() * f64::from(count)) as u32
     }
 
-    /// Mostly of the size one, now and then nothing, tiny, huge or negative.
+    /// Mostly of order one; now and then zero, tiny, huge or negative.
     pub fn number(&mut self) -> f64 {
         match self.below(20) {
             0 => 0.0,

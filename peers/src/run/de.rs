@@ -36,7 +36,7 @@ impl<S: System<N>, const N: usize, const D: usize> ODE<f64, [f64; D]> for Equati
     }
 }
 
-/// Keeps nothing of what it is shown.
+/// An output that keeps nothing.
 struct Nothing;
 
 impl<const D: usize> Solout<f64, [f64; D]> for Nothing {
@@ -56,7 +56,7 @@ impl<const D: usize> Solout<f64, [f64; D]> for Nothing {
     }
 }
 
-/// The most steps: more than any setting of ours needs.
+/// The limit of steps: more than any of our settings needs.
 const STEPS: usize = 20_000_000;
 
 fn run<M, S: System<N>, const N: usize, const D: usize>(
@@ -85,7 +85,7 @@ where
     })
 }
 
-/// Its words without the state, which is long.
+/// The reason for a failure, without the state, which would be long.
 fn said<const D: usize>(failure: &Failure<f64, [f64; D]>) -> &'static str {
     match failure {
         Failure::BadInput { .. } => "bad input",
@@ -98,7 +98,7 @@ fn said<const D: usize>(failure: &Failure<f64, [f64; D]>) -> &'static str {
 
 macro_rules! adaptive {
     ($name:ident, $method:expr) => {
-        /// With tolerances of each component.
+        /// Runs with a tolerance for each component.
         pub fn $name<S: System<N>, const N: usize, const D: usize>(
             problem: &Problem<'_, S, N, D>,
             tolerance: f64,
@@ -119,7 +119,7 @@ adaptive!(verner87, ExplicitRungeKutta::rkv877e());
 adaptive!(radau5, ImplicitRungeKutta::radau5());
 adaptive!(bdf, BackwardDifferentiationFormula::adaptive());
 
-/// Forest and Ruth's composition of order 4, with a whole number of equal steps.
+/// The composition of Forest and Ruth, of order 4, with a whole number of equal steps.
 pub fn forest_ruth<S: System<N>, const N: usize, const D: usize>(
     problem: &Problem<'_, S, N, D>,
     steps: f64,

@@ -1,4 +1,4 @@
-//! The crate `diffsol`, with dense matrices of `nalgebra` and products with the Jacobian by hand.
+//! The crate `diffsol`, with dense matrices of `nalgebra` and hand-written products with the Jacobian.
 
 use super::{Outcome, Problem, Run};
 use crate::system::{System, product, rates};
@@ -11,7 +11,7 @@ type LU = NalgebraLU<f64>;
 
 macro_rules! method {
     ($name:ident, $solver:ident $(::<$linear:ty>)?) => {
-        /// With tolerances of each component.
+        /// Runs with a tolerance for each component.
         pub fn $name<S: System<N>, const N: usize, const D: usize>(
             problem: &Problem<'_, S, N, D>,
             tolerance: f64,

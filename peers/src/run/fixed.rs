@@ -1,4 +1,4 @@
-//! The crate `utsuroi`: leapfrog and Yoshida's compositions of it, in equal steps.
+//! The crate `utsuroi`: leapfrog and Yoshida's compositions of it, with equal steps.
 
 use super::{Outcome, Problem, Run};
 use crate::system::System;
@@ -22,7 +22,7 @@ impl<S: System<N>, const N: usize> DynamicalSystem for Equations<'_, S, N> {
 
 macro_rules! composition {
     ($name:ident, $method:expr, $evaluations:expr) => {
-        /// With a whole number of equal steps.
+        /// Runs with a whole number of equal steps.
         pub fn $name<S: System<N>, const N: usize, const D: usize>(
             problem: &Problem<'_, S, N, D>,
             steps: f64,

@@ -21,12 +21,13 @@ impl<S: System<N>, const N: usize, const D: usize> ode_solvers::System<f64, Vect
     }
 }
 
-/// The most steps: more than any setting of ours needs.
+/// The limit of steps: more than any of our settings needs.
 const STEPS: u32 = 20_000_000;
-/// It looks for stiffness at every so many steps, and would stop there.
+/// The solver tests for stiffness after every this many steps, and would stop: so never.
 const NEVER: u32 = u32::MAX;
 
-/// It knows one absolute tolerance for all components: the units are chosen so that one will do, and it is that of the mean size.
+/// The solver has one absolute tolerance for all components. Units are chosen such that one is enough; it is relative
+/// to the mean size.
 fn absolute<S: System<N>, const N: usize, const D: usize>(
     problem: &Problem<'_, S, N, D>,
     tolerance: f64,
@@ -36,7 +37,7 @@ fn absolute<S: System<N>, const N: usize, const D: usize>(
 
 macro_rules! run {
     ($name:ident, $solver:ident, $safety:expr, $beta:expr, $least:expr, $most:expr) => {
-        /// With the constants that are its defaults, and only the accepted steps as output, which is the least it gives.
+        /// With the default constants, and only the accepted steps as output, which is the least possible.
         pub fn $name<S: System<N>, const N: usize, const D: usize>(
             problem: &Problem<'_, S, N, D>,
             tolerance: f64,

@@ -1,6 +1,8 @@
-//! A program without `std` and without an allocator: emitted solvers of two and of four nodes step a pendulum and a double pendulum.
+//! A program without `std` and without an allocator: emitted solvers with two and with four nodes step a pendulum and a
+//! double pendulum.
 //!
-//! Its exit code says what failed: 0 nothing, 1 a step, 2 and more a check. Without the feature `two-nodes` one of the two solvers is declared but not used.
+//! The exit code says what failed: 0 nothing, 1 a step, 2 or more a check of a result. Without the feature `two-nodes`,
+//! one of the two solvers is declared but not used, which must not make the program larger.
 
 #![no_std]
 #![no_main]
@@ -30,7 +32,7 @@ unsafe extern "C" {}
 #[unsafe(no_mangle)]
 extern "C" fn main(_arguments: i32, _values: *const *const u8) -> i32 {
     let pendulum = Pendulum { k: 1.0 };
-    // Reference at t = 10 from q = 2 at rest: 32 digits, tests/reference/trajectories.json.
+    // The reference at t = 10 from q = 2 at rest, with 32 digits; tests/reference/trajectories.json.
     let exact = 0.713_148_180_601_379_4;
 
     let mut state = pendulum.state([2.0], [0.0]);
@@ -40,7 +42,7 @@ extern "C" fn main(_arguments: i32, _values: *const *const u8) -> i32 {
             return 1;
         }
     }
-    // Order 6: (h = 0.05) a few 1e-10.
+    // The element has order 6: the error with h = 0.05 is a few 1e-10.
     if !((state.q[0] - exact).abs() < 1e-8) {
         return 2;
     }
@@ -54,7 +56,7 @@ extern "C" fn main(_arguments: i32, _values: *const *const u8) -> i32 {
                 return 1;
             }
         }
-        // Order 2: a few 1e-5.
+        // The element has order 2: the error is a few 1e-5.
         if !((state.q[0] - exact).abs() < 1e-3) {
             return 3;
         }

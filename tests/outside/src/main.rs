@@ -1,4 +1,5 @@
-//! What a user writes, in a crate that depends on nothing but `tfe`.
+//! The code of a typical user, in a crate that depends on nothing but `tfe`: it compiles and runs what the
+//! documentation shows.
 
 use std::f64::consts::TAU;
 use tfe::prelude::*;
@@ -38,7 +39,7 @@ struct Oscillator {
     c: f64,
 }
 
-/// Fixed ends, any number of masses known at compile time.
+/// A chain with fixed ends and a number of masses known at compile time.
 #[dynamics(coordinates(q[N]),
            lagrangian = sum(i in 0..N, m/2*dot(q[i])^2) - sum(i in 0..N-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3)
                       - k/2*(q[0]^2 + q[N-1]^2))]
@@ -48,7 +49,7 @@ struct Chain<const N: usize> {
     a: f64,
 }
 
-/// Free ends, any number of masses known at run time.
+/// A chain with free ends and a number of masses known at run time.
 #[dynamics(coordinates(q[n]),
            lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3))]
 struct LongChain {
@@ -91,7 +92,7 @@ struct KnifeEdge {
     alpha: f64,
 }
 
-/// A ball on the ground, with an input, an event, an output, and parameters by which it is differentiated.
+/// A ball above the ground, with an input, an event, an output, and parameters for derivatives.
 #[dynamics(
     coordinates(y),
     lagrangian = m/2*dot(y)^2 - m*g*y,
@@ -107,7 +108,7 @@ struct Ball {
     c: f64,
 }
 
-/// Events, inputs, derivatives, a loop of control, a fit.
+/// Uses events, inputs, derivatives, a control loop and a fit.
 fn steered() -> Result<(), Box<dyn std::error::Error>> {
     let ball = Ball {
         m: 1.0,
@@ -162,7 +163,7 @@ fn steered() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Ensembles, accuracies and comparisons.
+/// Uses ensembles, runs with an accuracy, and comparisons.
 fn compared(pendulum: &DoublePendulum, start: State<2>) -> Result<(), Box<dyn std::error::Error>> {
     let ends = Ensemble::new(pendulum)
         .element(Mixed::<6>)
@@ -184,7 +185,7 @@ fn compared(pendulum: &DoublePendulum, start: State<2>) -> Result<(), Box<dyn st
     Ok(())
 }
 
-/// Constraints of both kinds.
+/// Uses constraints of both kinds.
 fn constrained() -> Result<(), Box<dyn std::error::Error>> {
     let pendulum = RodPendulum {
         m: 1.0,
