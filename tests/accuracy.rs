@@ -1,4 +1,4 @@
-//! Estimated errors against true ones, and runs that pick their element and step.
+//! Estimated errors compared with true ones, and runs with a given accuracy, which choose their element and step size.
 
 #[path = "common/largest.rs"]
 mod largest;
@@ -14,9 +14,9 @@ struct Pendulum;
 #[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2)/2 - 1/sqrt(x^2 + y^2))]
 struct Kepler;
 
-/// After ten units of time from rest at two radians; 32 digits of arithmetic.
+/// The state of a pendulum at t = 10 from rest at two radians, computed with 32 digits.
 const PENDULUM_END: ([f64; 1], [f64; 1]) = ([0.7131481806013794], [-1.5313085041358347]);
-/// Eccentricity 0.6, twenty units of time from the pericentre; 32 digits of arithmetic.
+/// The state at t = 20 on a Kepler orbit of eccentricity 0.6 from its pericentre, computed with 32 digits.
 const KEPLER_END: ([f64; 2], [f64; 2]) = (
     [-0.770_075_578_411_240_4, 0.788_344_816_994_424_4],
     [-0.894_183_731_988_691_5, -0.123_461_764_158_440_96],
@@ -29,7 +29,8 @@ fn kepler_start() -> State<2> {
     }
 }
 
-/// The error at the end as it is estimated: over the largest coordinate and the largest momentum of the motion.
+/// The error at the end in the norm of the estimates: relative to the largest coordinate and the largest momentum of
+/// the motion.
 fn true_error<const N: usize>(motion: &Motion<N>, (q, p): ([f64; N], [f64; N])) -> f64 {
     let of = |exact: &[f64; N], part: fn(&tfe::Node<N>) -> &[f64; N]| {
         let size = motion
@@ -51,7 +52,8 @@ fn at_end<T>(motion: &Estimated<T>) -> f64 {
     motion.error_estimates().last().expect("an estimate").1
 }
 
-/// Estimates over true errors on a grid of elements and steps, where the true error is between `floor` and a hundredth.
+/// Ratios of estimated to true errors for a grid of elements and steps, where the true error is between `floor` and a
+/// hundredth.
 fn ratios<M: Model<N>, const N: usize>(
     model: &M,
     start: State<N>,
@@ -89,7 +91,8 @@ fn ratios<M: Model<N>, const N: usize>(
     ratios
 }
 
-/// Nine elements, eleven steps, two motions: an element of one node more is so much better that the difference is the error.
+/// For nine elements, eleven step sizes and two motions the estimate is close to the true error: the element with one
+/// node more is so much more accurate that the difference is the error of the first one.
 #[test]
 fn estimates_are_true_errors_within_a_factor_of_two() {
     let steps = [
@@ -118,7 +121,7 @@ fn estimates_are_true_errors_within_a_factor_of_two() {
     assert!(100 * good >= 95 * all.len(), "{good} of {}", all.len());
 }
 
-/// Asked for ε, off by no more, with no more than five runs.
+/// With an accuracy ε, the true error is at most ε, after at most five runs.
 #[test]
 fn accuracy_is_met() {
     for digits in 2..=12 {
@@ -154,7 +157,8 @@ fn accuracy_is_met() {
     }
 }
 
-/// An element of twelve nodes is compared with two of half its length, also where another one is more than twice as long: estimates of the short ones were exactly zero.
+/// An element of twelve nodes is compared with two of half its length. This must hold for all steps, also if others are
+/// more than twice as long: the estimates of the short ones were once exactly zero.
 #[test]
 fn all_steps_are_halved_where_there_is_no_higher_order() {
     let start = Pendulum.state([2.0], [0.0]);
@@ -164,7 +168,7 @@ fn all_steps_are_halved_where_there_is_no_higher_order() {
     let motion = run.run_estimated(start, 0.0..26.5).expect("runs");
     let before = motion.error_estimates().take(20);
     let most = before.map(|(_, error)| error).fold(0.0, larger);
-    // By the poles of the motion at i·1.7 some 1e-16 a step.
+    // The singularities of the motion at ±1.7i limit the error of a step to about 1e-16.
     assert!(0.0 < most && most < 1e-6, "{most:e}");
     let empty = simulation.run_estimated(start, 1.0..1.0);
     assert_eq!(empty.expect("nothing to do").error_estimate(), 0.0);
@@ -182,7 +186,7 @@ fn what_was_chosen_before_stays() {
     assert_eq!(picked.element, Primal::<4>.into());
     assert!(picked.step <= 0.05);
     assert!(true_error(motion.motion(), PENDULUM_END) <= 1e-6);
-    // Backwards from the end, and the recorded nodes are those that were asked for.
+    // Backwards in time, and the nodes recorded are those asked for.
     let (q, p) = PENDULUM_END;
     let back = Simulation::new(&Pendulum).record_every(2).accuracy(1e-9);
     let back = back.run(State { q, p }, 10.0..0.0).expect("runs");
@@ -191,7 +195,7 @@ fn what_was_chosen_before_stays() {
     assert!((back.states().len() as u64) < back.statistics().steps);
 }
 
-/// A run of one's own with all that was picked.
+/// A run with explicit settings, all those that were chosen.
 #[test]
 fn what_was_picked_makes_the_same_motion() {
     let start = Pendulum.state([2.0], [0.0]);
@@ -214,9 +218,9 @@ fn what_was_picked_makes_the_same_motion() {
         (first.q[0] - second.q[0]).abs(),
         (first.p[0] - second.p[0]).abs(),
     );
-    // What iterations leave is far below what is asked.
+    // The error left by the iterations is far below the accuracy asked for.
     assert!(apart <= 1e-9, "{apart:e}");
-    // What does not iterate is solved as the simulation says.
+    // A linear model needs no iteration and is solved as the simulation says.
     let linear = Simulation::new(&Oscillator).accuracy(1e-8);
     let linear = linear.run(Oscillator.state([1.0], [0.0]), 0.0..10.0);
     let linear = linear.expect("runs");
@@ -226,7 +230,8 @@ fn what_was_picked_makes_the_same_motion() {
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = select(t < 1, 1, -1))]
 struct Switched;
 
-/// x = 1 − cos t up to the switch at one, then −1 + a cos(t − 1) + b sin(t − 1); an impulse at three adds to the momentum.
+/// In closed form, x = 1 − cos t up to the switch at t = 1, then −1 + a cos(t − 1) + b sin(t − 1); an impulse at t = 3
+/// adds to the momentum.
 #[test]
 fn breaks_and_impulses_are_ends_of_elements() {
     let (x, v) = (1.0 - 1.0_f64.cos(), 1.0_f64.sin());
@@ -260,7 +265,7 @@ struct RodPendulum {
     g: f64,
 }
 
-/// The same pendulum in Cartesian coordinates, from rest at two radians.
+/// The same pendulum in Cartesian coordinates with a constraint, from rest at two radians.
 #[test]
 fn constraints_are_no_obstacle() {
     let rod = RodPendulum {
@@ -303,7 +308,8 @@ fn linear_models_too() {
 )]
 struct DoublePendulum;
 
-/// A chaotic motion: what cannot be had is refused, with the motion, its error and how far it is good.
+/// For a chaotic motion over too long a span the accuracy is refused; the error has the motion, its estimated error and
+/// the time up to which it is accurate.
 #[test]
 fn what_cannot_be_met_is_an_error_with_a_horizon() {
     let start = DoublePendulum.state([3.0, 3.1], [0.0, 0.0]);
@@ -323,7 +329,7 @@ fn what_cannot_be_met_is_an_error_with_a_horizon() {
     let until = until.expect("the beginning is good");
     assert!(1.0 < until && until < 40.0, "{until}");
     assert_eq!(error.partial().last().t, 60.0);
-    // Up to there it can be had.
+    // Up to that time, the accuracy is met.
     let shorter = Simulation::new(&DoublePendulum)
         .accuracy(1e-9)
         .run(start, 0.0..until / 2.0);
@@ -353,7 +359,8 @@ struct DrivenDuffing {
     w: f64,
 }
 
-/// Both runs of a pendulum at rest agree to the last bit, which is no reason to promise what numbers cannot hold.
+/// For a pendulum at rest both runs agree to the last bit. Even so, an accuracy below the rounding unit must not be
+/// promised.
 #[test]
 fn less_than_a_rounding_is_refused_at_once() {
     let start = Pendulum.state([2.0], [0.0]);
@@ -383,7 +390,8 @@ fn less_than_a_rounding_is_refused_at_once() {
     }
 }
 
-/// All runs of a search, in evaluations, beside a run with the fewest equal steps of the same element from which on the accuracy is met, none of them cut.
+/// The evaluations of all runs of a search, divided by those of a run with the fewest equal steps of the same element
+/// that meets the accuracy from there on, none of them cut.
 #[test]
 fn a_search_costs_a_few_runs() {
     let model = DrivenDuffing {
@@ -395,7 +403,7 @@ fn a_search_costs_a_few_runs() {
     let simulation = Simulation::new(&model);
     let fine = simulation.clone().element(Mixed::<9>).step(0.05);
     let exact = fine.run(start, span.clone()).expect("short steps");
-    // At all nodes: the motion forgets its start.
+    // The error at all nodes, since the motion forgets its initial state.
     let off = |motion: &Motion<1>| {
         let largest = |part: fn(&tfe::Node<1>) -> f64| {
             let nodes = motion.states().iter();
@@ -421,7 +429,7 @@ fn a_search_costs_a_few_runs() {
             let is_by_hand = motion.statistics().cuts == 0;
             (is_by_hand && off(&motion) <= accuracy).then(|| work(motion.statistics()))
         };
-        // Not by chance.
+        // The runs with more steps must meet it too: not only by chance.
         let meets = |count: u32| (count..count + 3).all(|count| made(count).is_some());
         let fewest = (1..5000).find(|count| meets(*count)).expect("enough");
         let least = made(fewest).expect("it was made");
@@ -464,7 +472,7 @@ fn what_is_no_accuracy_is_refused() {
         .run(start, 0.0..f64::NAN)
         .expect_err("no span");
     assert!(matches!(error.kind(), RunErrorKind::Span { .. }), "{error}");
-    // Nothing to do, and no error.
+    // An empty span: nothing to do, and no error.
     let motion = Simulation::new(&Pendulum)
         .accuracy(1e-3)
         .run(start, 2.0..2.0)
@@ -476,7 +484,8 @@ fn what_is_no_accuracy_is_refused() {
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + 1/x)]
 struct Fall;
 
-/// A fall into the centre after π/√8: an error at that time, with the motion so far, whatever was asked. Steps that are shorter and shorter are not tried for ever.
+/// A fall into the centre ends at t = π/√8: for every accuracy there must be an error at that time, with the motion so
+/// far, and not an endless search with shorter and shorter steps.
 #[test]
 fn a_motion_that_ends_keeps_what_there_is() {
     let start = Fall.state([1.0], [0.0]);
@@ -505,8 +514,8 @@ struct Chain {
     a: f64,
 }
 
-/// The same for a chain of any length, against a run with steps so short that only roundings are left.
-/// A force that jumps with the velocity, from rest, with points at the ends of elements: errors fall with the step alone, and what is asked would take a thousand million steps.
+/// A force that jumps with the velocity, from rest, with quadrature points at the ends of elements: the error is
+/// proportional to the step size, so that the accuracy asked for would take 10⁹ steps. It is refused.
 #[test]
 fn what_would_take_too_many_steps_is_refused() {
     #[dynamics(
@@ -537,7 +546,8 @@ fn what_would_take_too_many_steps_is_refused() {
     );
 }
 
-/// A bead that slides into the cusp of a curve has no motion from there on, though steps may get across: it was tried with steps of half, half of that, … without an end.
+/// A bead that slides into the cusp of a curve has no motion beyond it, though single steps may jump across. The step
+/// size must not be halved without end, as it once was.
 #[test]
 fn a_motion_that_ends_in_a_cusp_is_refused() {
     #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(cusp) = y^3 - x^2)]
@@ -557,13 +567,14 @@ fn a_motion_that_ends_in_a_cusp_is_refused() {
     let RunErrorKind::Solve { time, step, .. } = *error.kind() else {
         panic!("{error}");
     };
-    // It slides up a little, and back.
+    // The bead slides up a little and then back into the cusp.
     assert!((0.15..0.25).contains(&time), "{time}");
-    // Steps did not become ever shorter.
+    // The steps have not become shorter and shorter.
     assert!(step > 1e-7, "{step}");
     assert!(error.partial().last().t <= time);
 }
 
+/// The same for a chain of any length, compared with a run whose steps are so short that only rounding errors are left.
 #[test]
 fn families_know_their_errors_too() {
     let chain = Chain { n: 40, a: 0.25 };
@@ -632,7 +643,7 @@ fn families_know_their_errors_too() {
     );
 }
 
-/// A longest step that is none is refused.
+/// An invalid largest step size is refused.
 #[test]
 fn the_longest_step_is_checked() {
     for step in [0.0, f64::NAN] {
@@ -643,7 +654,8 @@ fn the_longest_step_is_checked() {
     }
 }
 
-/// Breaks that are one but for a rounding, or at the end but for one, leave no element between them.
+/// Breaks that are equal up to rounding, or equal to the end up to rounding, must not produce a tiny element between
+/// them.
 #[test]
 fn breaks_a_rounding_apart_are_one() {
     let start = Pendulum.state([2.0], [0.0]);

@@ -1,4 +1,4 @@
-//! No allocation per step, in every way a step can be done.
+//! No step allocates memory, in any of the ways to make one.
 
 use allocation_counter::measure;
 use tfe::family;
@@ -32,7 +32,7 @@ struct Rod {
     g: f64,
 }
 
-/// Allocations of so many steps after the first few.
+/// The number of allocations in a number of steps after the first few.
 fn allocations<M: Model<N>, const N: usize>(
     model: &M,
     element: Element,
@@ -54,7 +54,7 @@ fn allocations<M: Model<N>, const N: usize>(
             stepper.advance(t, 0.01, &mut state, &[]).expect("a step");
         }
     };
-    // The matrix of a linear model is made after 2N + 1 steps.
+    // The matrix of a linear model is computed once, after 2N + 1 steps.
     walk(0, 40);
     measure(|| walk(40, 40 + steps)).count_total
 }
@@ -94,7 +94,7 @@ fn steps_do_not_allocate() {
     none(&rod, Element::mixed(4), rod.state([1.0, 0.0], [0.0, 0.0]));
 }
 
-/// The emitted solver, which has no allocator to ask.
+/// Emitted solvers, which have no allocator.
 #[test]
 fn specialised_solvers_do_not_allocate() {
     #[dynamics(
@@ -116,7 +116,7 @@ fn specialised_solvers_do_not_allocate() {
     assert_eq!(count.count_total, 0);
 }
 
-/// A loop of control: what is set before every step, and the node after it.
+/// A control loop: inputs set before every step, and the node read after it.
 #[test]
 fn loops_of_control_do_not_allocate() {
     #[dynamics(
@@ -157,7 +157,7 @@ struct Chain {
     n: usize,
 }
 
-/// A family, whose vectors have the length of the model: all of its memory is there after the first steps.
+/// A model of run-time length, whose vectors have the length of the model: all memory is allocated in the first steps.
 #[test]
 fn steps_of_families_do_not_allocate() {
     for n in [3, 40, 2000] {
@@ -180,7 +180,7 @@ fn steps_of_families_do_not_allocate() {
     }
 }
 
-/// Eight trajectories, and eight parameter sets, side by side.
+/// Eight trajectories, and eight parameter sets, in lanes.
 #[test]
 fn steps_in_lanes_do_not_allocate() {
     let models: Vec<_> = (1..=8)
@@ -207,7 +207,8 @@ fn steps_in_lanes_do_not_allocate() {
     assert_eq!(measure(|| walk(10, 500)).count_total, 0);
 }
 
-/// Dense output is the memory that it is kept in, and nothing besides: a run of twice as many steps makes twice as many allocations.
+/// Dense output allocates only the memory in which it is kept: a run with twice as many steps makes twice as many
+/// allocations.
 #[test]
 fn dense_output_allocates_what_it_keeps() {
     let pendulum = Pendulum { l: 1.0, g: 9.81 };
@@ -221,7 +222,7 @@ fn dense_output_allocates_what_it_keeps() {
         used.count_total
     };
     let (once, twice) = (count(1000), count(2000));
-    // Vectors of nodes double their room once more.
+    // A few more, because the vectors of nodes double their capacity once more.
     let a_step = (twice - once) as f64 / 1000.0;
     assert!(a_step <= 2.1, "{a_step} allocations a step");
     let motion = simulation.run(start, 0.0..1.0).expect("a motion");

@@ -1,4 +1,4 @@
-//! Ladders of models: errors of models against closed forms, choices, what is refused.
+//! Ladders of models: model errors compared with closed forms, the choice of a model, and what is refused.
 
 mod common;
 
@@ -36,7 +36,7 @@ struct Full {
     w: f64,
 }
 
-/// The same pendulum, its bob on a rod: two coordinates and a constraint.
+/// The same pendulum in Cartesian coordinates with a rod: two coordinates and a constraint.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2 - w^2*y,
@@ -47,7 +47,7 @@ struct Bob {
     w: f64,
 }
 
-/// The root of an angle that becomes negative.
+/// A model with the square root of an angle that becomes negative.
 #[dynamics(
     coordinates(theta),
     lagrangian = dot(theta)^2/2 + w^2*cos(theta),
@@ -57,7 +57,7 @@ struct Lost {
     w: f64,
 }
 
-/// Pendulums side by side, of which the first is looked at.
+/// Independent pendulums, of which the first one is observed.
 #[dynamics(
     coordinates(theta[n]),
     lagrangian = sum(i in 0..n, dot(theta[i])^2/2 + w^2*cos(theta[i])),
@@ -110,7 +110,7 @@ impl Spring {
         }
     }
 
-    /// At rest, as long as the weight makes it there.
+    /// At rest, with the length of equilibrium.
     fn start(&self) -> State<2> {
         let length = self.l + self.m * self.g * Self::ANGLE.cos() / self.k;
         self.state([length, Self::ANGLE], [0.0; 2])
@@ -124,7 +124,7 @@ fn amplitude() -> f64 {
     5.0_f64.to_radians()
 }
 
-/// Errors and evaluations are tested, not times.
+/// The tests check errors and numbers of evaluations, not times.
 fn ladder<'m>(span: std::ops::Range<f64>) -> Fidelity<'m> {
     Fidelity::new(span)
         .repeat_for(Duration::ZERO)
@@ -142,7 +142,7 @@ fn pendulums() -> Ladder {
         .unwrap()
 }
 
-/// The largest |cos ωt − cos ω't| at the ends of sixteen parts, with ω' = ω (1 − lag).
+/// The largest |cos ωt − cos ω't| at the ends of sixteen parts of the span, with ω' = ω (1 − lag).
 fn of_phase(lag: f64) -> f64 {
     let times = (1..=16).map(|k| W * END * f64::from(k) / 16.0);
     times
@@ -156,7 +156,8 @@ fn errors_of_models_are_those_of_their_frequencies() {
     assert_eq!(ladder.outputs(), ["angle"]);
     let error = |rung: usize| ladder.rungs()[rung].model_error();
     let a = amplitude();
-    // ω/ω₀ = 1 − a²/16 of the full pendulum, 1 of the linear one; the energy that the cubic one leaves out, ω₀² a⁶/720 on average times 5/16, makes a⁴/384.
+    // With ω₀ for small amplitudes a, the full pendulum has ω/ω₀ = 1 − a²/16, the linear one 1. The energy that the
+    // cubic model neglects, on average ⟨V⟩ = 5/16 ω₀² a⁶/720, shifts its frequency by d⟨V⟩/da/(ω₀ a) = ω₀ a⁴/384.
     let (linear, cubic) = (error(0).unwrap(), error(1).unwrap());
     assert!(
         (linear / of_phase(a.powi(2) / 16.0) - 1.0).abs() < 0.1,
@@ -175,7 +176,7 @@ fn each_accuracy_takes_the_model_it_needs() {
     let [linear, cubic] = [0, 1].map(|rung: usize| ladder.rungs()[rung].model_error().unwrap());
     let rung = |accuracy| ladder.cheapest(accuracy).map(|choice| choice.rung.as_str());
     assert!(rung(1e-1).is_some());
-    // No linear run is taken where its model is too coarse, however lucky its steps; nor a cubic one.
+    // A model that is too inaccurate is not chosen, even if the error of one of its runs is small by chance.
     for k in 0..200 {
         let accuracy = 0.1 * 0.9_f64.powi(k);
         let chosen = rung(accuracy);
@@ -187,11 +188,11 @@ fn each_accuracy_takes_the_model_it_needs() {
     }
     let best = ladder.cheapest(1e-9).unwrap();
     assert!(best.rung == "full" && best.error <= 1e-9);
-    // Where it is good enough, it is also the cheapest.
+    // Where the linear model is accurate enough, it is also the cheapest.
     assert_eq!(rung(linear), Some("linear"));
     let cheaper = ladder.cheapest(1e-2).unwrap().evaluations;
     assert!(cheaper < best.evaluations);
-    // What the reference does not know is refused.
+    // Accuracies beyond that of the reference are refused.
     assert!(!ladder.is_known(ladder.reference().uncertainty()));
     assert_eq!(ladder.cheapest(1e-30), None);
 }
@@ -232,7 +233,7 @@ fn rungs_may_differ_in_length_and_kind() {
         .accuracies([1e-4, 1e-8])
         .run()
         .unwrap();
-    // One model twice: no error of the model is to be found above the smallest accuracy.
+    // Two equal models: the model error must be found to be below the smallest accuracy.
     let many = &ladder.rungs()[0];
     assert!(
         many.model_error().is_none_or(|error| error < 1e-8),
@@ -246,7 +247,7 @@ fn total(one: Operations) -> u32 {
     one.additions + one.multiplications + one.divisions + one.sines + one.functions
 }
 
-/// The least number of operations in kernels with which a rung is so accurate.
+/// The smallest number of operations in kernels with which a model reaches an accuracy.
 fn operations(rung: &Rung, structure: &Structure, accuracy: f64) -> u64 {
     let work = |choice: &Choice| {
         choice.statistics.residual_evaluations * u64::from(total(structure.first))
@@ -277,8 +278,9 @@ fn ignored_angles_cost_no_accuracy_and_save_operations() {
         assert!(least.fold(1.0, f64::min) < 1e-10, "{rung:?}");
         assert_eq!(rung.model_error(), None);
     }
-    // Found 16900 of 23120 for 1e-6, where the full model is right by now with so long a step that some of its steps are cut, and 17888 of 35048 for the others; the whole
-    // solves for three unknowns besides.
+    // Measured operations of the reduced and the full model: 16 900 and 23 120 for 1e-6, where the full model is
+    // accurate enough with steps so long that some of them are cut, and 17 888 and 35 048 for the others. The full
+    // model also has to solve for three unknowns instead of one.
     for (accuracy, most) in [(1e-6, 0.75), (1e-8, 2.0 / 3.0), (1e-10, 2.0 / 3.0)] {
         let [reduced, full] = [
             operations(reduced, &Nutation::structure(), accuracy),
@@ -302,7 +304,7 @@ fn rods_err_by_the_compliance_of_their_springs() {
             .rung("spring", &spring, spring.start())
             .elements([Mixed::<5>.into(), Mixed::<9>.into()])
             .accuracies([1e-1, 1e-6])
-            .parts(96) // a period of the softest spring has a step, so that the reference does not miss its oscillation
+            .parts(96) // the first steps tried resolve the period of the softest spring, so that the reference does not miss its oscillation
             .run()
             .unwrap();
         assert_eq!(ladder.outputs(), ["x", "y"]);
@@ -319,7 +321,8 @@ fn rods_err_by_the_compliance_of_their_springs() {
     assert!(points.iter().all(|[rod, long]| long.1 < rod.1 / 3.0));
 }
 
-/// Steps of several swings are cut, all into the same pieces: runs that agree because of that are neither a reference nor an error of the model.
+/// Steps much longer than an oscillation are cut, all of them into the same pieces: runs that agree for that reason
+/// must serve neither as a reference nor as a model error.
 #[test]
 fn runs_that_agree_because_they_are_cut_tell_nothing() {
     let (w, lag) = (200.0, 1e-5);
@@ -335,9 +338,9 @@ fn runs_that_agree_because_they_are_cut_tell_nothing() {
     let Reference::Computed { step, .. } = *found.reference() else {
         panic!("{:?}", found.reference());
     };
-    // A small swing takes 0.031, and the first steps that are tried 0.25.
+    // The period of a small oscillation is 0.031; the first step size tried is 0.25.
     assert!(step < 0.031, "{step}");
-    // By a composition of leapfrogs of order 8, with 8000 and with 16 000 steps.
+    // The reference is from a composition of leapfrogs of order 8, with 8000 and with 16 000 steps.
     let right = 0.005_907_765_687;
     let error = found.rungs()[0].model_error().expect("above 1e-4");
     assert!((error - right).abs() < 0.05 * right, "{error}");
@@ -358,8 +361,9 @@ fn steps_that_miss_the_oscillation_of_a_spring_tell_its_swing() {
         let pairs = resolved.states().iter().zip(long.states());
         let apart = pairs.map(|(a, b)| common::distance(&a.q, &b.q));
         let apart = apart.fold(0.0, larger);
-        // At rest the length of equilibrium l + (m/k) (g cos θ + l θ̇²) has the acceleration 3 m g² sin² θ/(k l), which over ω² is the amplitude. Long steps
-        // keep it with another phase; roundings of ten thousand steps besides.
+        // The length of equilibrium l + (m/k) (g cos θ + l θ̇²) has at rest the acceleration 3 m g² sin² θ/(k l);
+        // divided by ω² this is the amplitude of the oscillation. Long steps keep the amplitude but not the phase:
+        // hence a difference of at most twice the amplitude, plus rounding errors of ten thousand steps.
         let pull = spring.m * spring.g * Spring::ANGLE.sin() / k;
         let amplitude = 3.0 * pull.powi(2) / spring.l;
         assert!(apart < 2.0 * amplitude + 1e-12, "{k:e}: {apart:e}");

@@ -1,4 +1,4 @@
-//! Parameters found from measured motions.
+//! Parameters identified from measured motions.
 
 use tfe::fit::FitError;
 use tfe::prelude::*;
@@ -38,7 +38,7 @@ fn heights() -> Vec<f64> {
     motion.outputs().column("height").expect("declared")
 }
 
-/// Normal numbers with the deviation one, always the same.
+/// Random numbers of the standard normal distribution, always the same.
 struct Noise(u64);
 
 impl Noise {
@@ -49,7 +49,7 @@ impl Noise {
             self.0 ^= self.0 << 17;
             (self.0 >> 11) as f64 / (1_u64 << 53) as f64
         };
-        // The sum of twelve uniform numbers has the variance one.
+        // The sum of twelve uniform random numbers has variance one.
         (0..12).map(|_| uniform()).sum::<f64>() - 6.0
     }
 }
@@ -79,7 +79,7 @@ fn exact_measurements_give_exact_parameters() {
     assert!(fit.to_string().contains("g") && fit.to_string().contains("runs"));
 }
 
-/// Times of two clocks, as products and as sums have them, and a break of a third one.
+/// Times from two clocks, computed by products and by sums, and a break at that of a third one.
 #[test]
 fn times_a_few_roundings_apart_are_one() {
     let guess = Ball { g: 8.0, ..TRUE };
@@ -101,8 +101,7 @@ fn times_a_few_roundings_apart_are_one() {
     }
 }
 
-/// As short as it can be: the start is found, too.
-/// Units make no difference: of masses, of what is measured, of its deviation.
+/// Units must not matter: neither those of the masses, nor of the measured quantity, nor of its standard deviation.
 #[test]
 fn sizes_do_not_matter() {
     let fitted = |mass: f64, length: f64, deviation: f64| {
@@ -140,7 +139,8 @@ fn sizes_do_not_matter() {
             else {
                 panic!("{name} is looked for");
             };
-            // A minimum is known to the root of a rounding; what it is off by is some 1e-3.
+            // The position of a minimum is known to the square root of the rounding unit relative to the deviations,
+            // here about 1e-3 of them.
             assert!(
                 (value / unit - expected).abs() < 1e-6 * expected_off,
                 "{name} {mass:e} {length:e} {deviation:e}: {value:e}"
@@ -153,6 +153,7 @@ fn sizes_do_not_matter() {
     }
 }
 
+/// The shortest use: the initial state is fitted, too.
 #[test]
 fn a_start_that_is_not_told_is_found() {
     let guess = Ball {
@@ -170,7 +171,7 @@ fn a_start_that_is_not_told_is_found() {
     assert!((fit.value("c").expect("named") - 0.3).abs() < 1e-9);
     assert!((fit.start().q[0] - 1.0).abs() < 1e-10 && (fit.start().p[0] - 4.0).abs() < 1e-9);
     assert_eq!(fit.names().len(), 4);
-    // A coordinate by its name, from near by, with nothing else looked for.
+    // A coordinate given by its name, from a close guess, with no other unknowns.
     let only_start = Fit::new(&TRUE)
         .start_near(TRUE.state([0.5], [3.0]), 0.0)
         .step(0.05)
@@ -200,7 +201,7 @@ struct Links {
     c2: f64,
 }
 
-/// Six parameters of a double pendulum from noisy angles: what is found is off by what the covariance says.
+/// Six parameters of a double pendulum from noisy angles: the errors are as large as the covariance says.
 #[test]
 fn noise_moves_parameters_by_their_covariance() {
     const NAMES: [&str; 6] = ["l1", "l2", "m2", "k", "c1", "c2"];
@@ -262,18 +263,19 @@ fn noise_moves_parameters_by_their_covariance() {
             }
         }
         squares.push(square);
-        // Of (y − m)/σ the mean square is one.
+        // The mean square of (y − m)/σ is about one.
         let mean =
             fit.residuals().iter().map(|r| r * r).sum::<f64>() / fit.residuals().len() as f64;
         assert!((mean - 1.0).abs() < 0.2, "{mean}");
     }
-    // χ² of six: the mean of ten is 6 ± 1.1, and one in a thousand is above 22.5.
+    // The squared errors follow χ² with six degrees of freedom: the mean of ten is 6 ± 1.1, and one value in a thousand
+    // is above 22.5.
     let mean = squares.iter().sum::<f64>() / 10.0;
     assert!(mean > 2.5 && mean < 10.0, "{squares:?}");
     assert!(squares.iter().all(|one| *one < 22.5), "{squares:?}");
 }
 
-/// A bound that the truth lies beyond is where the parameter ends.
+/// If the true value is beyond a bound, the parameter ends at the bound.
 #[test]
 fn bounds_hold() {
     let guess = Ball {
@@ -293,7 +295,7 @@ fn bounds_hold() {
     assert!(g <= 9.5 && g > 9.499, "{g}");
 }
 
-/// However wide a range is, the fit begins where the model does: far from there the oscillator is out of phase.
+/// However wide a range is, the fit starts from the value of the model: far from there the oscillator is out of phase.
 #[test]
 fn wide_bounds_do_not_move_the_first_values() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2)]
@@ -319,7 +321,7 @@ fn wide_bounds_do_not_move_the_first_values() {
         (10.0, 1e3),
         (9.999_999, 1e9),
         (f64::NEG_INFINITY, 1e5),
-        // Beside bounds so wide 10 has three digits, or none.
+        // Relative to bounds so wide, 10 has three digits or none.
         (-1e12, 1e12),
         (-3e12, 1e12),
         (-1e12, f64::INFINITY),
@@ -330,7 +332,7 @@ fn wide_bounds_do_not_move_the_first_values() {
         let fit = fit(low, high);
         let first = fit.trials()[0].values[0];
         let off = (first - 10.0).abs();
-        // A first value at an end of its range begins a little inside.
+        // A first value at an end of its range is moved slightly inside.
         let inside = if low == 10.0 { 0.2 } else { 1e-9 };
         assert!(off <= inside, "{low} to {high}: {first}");
         let k = fit.value("k").expect("named");
@@ -338,7 +340,8 @@ fn wide_bounds_do_not_move_the_first_values() {
     }
 }
 
-/// A fit that ends since all runs nearby fail has found nothing: a rod of another length does not hold the start.
+/// A fit that ends because all runs nearby fail has not found a minimum: with a rod of another length the initial state
+/// violates the constraint.
 #[test]
 fn runs_that_fail_nearby_are_no_end() {
     #[dynamics(
@@ -415,7 +418,7 @@ fn what_cannot_be_fitted_is_told() {
             .to_string()
             .contains("is not fitted")
     );
-    // A first value that is no number has no bounds: the first run tells.
+    // A first value that is not a number has no bounds: the first run reports it.
     let unknown = Ball {
         g: f64::NAN,
         ..TRUE
@@ -425,7 +428,7 @@ fn what_cannot_be_fitted_is_told() {
         .step(0.05)
         .parameters(["g"]);
     assert!(matches!(with(unknown), Err(FitError::Run(_))));
-    // A motion that does not depend on the mass for itself, only on c/m: both cannot be told.
+    // The motion depends on c/m only and not on the mass alone: the two parameters cannot be determined separately.
     let rest = TRUE.state([1.0], [0.0]);
     let both = Fit::new(&TRUE)
         .start(rest, 0.0)
@@ -436,7 +439,7 @@ fn what_cannot_be_fitted_is_told() {
         matches!(told, FitError::Undetermined { .. }),
         "{told:?} {told}"
     );
-    // Nothing but the start is looked for, of a model that cannot be copied for want of a parameter.
+    // Only the initial state is unknown, and the model cannot be copied since it has no parameters.
     #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - 9.81*y)]
     struct Falling;
     let told = Fit::new(&Falling).output("y", &times, &measured).solve();
@@ -456,7 +459,7 @@ fn what_cannot_be_fitted_is_told() {
     assert!(matches!(with(nowhere), Err(FitError::Early { .. })));
 }
 
-/// The start of a model with constraints must be told; the parameter of a constraint can be found.
+/// For a model with constraints the initial state must be given; the parameter of a constraint can be fitted.
 #[test]
 fn constrained_models_are_fitted() {
     #[dynamics(
@@ -496,7 +499,7 @@ fn constrained_models_are_fitted() {
     let _: &runtime::Statistics = found.motion().statistics();
 }
 
-/// A pendulum with a motor whose strength is not known.
+/// A pendulum with a motor of unknown strength.
 #[dynamics(
     coordinates(theta),
     lagrangian = dot(theta)^2/2 + g*cos(theta),
@@ -510,7 +513,7 @@ struct Motor {
     c: f64,
 }
 
-/// Measurements with the inputs that made them: a function, and a table whose knots the elements end at.
+/// Measurements with the inputs that caused them: a function, and a table, at whose knots elements end.
 #[test]
 fn models_with_inputs_are_fitted() {
     let truth = Motor {

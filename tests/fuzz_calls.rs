@@ -1,5 +1,7 @@
-//! Random calls beside runs: derivatives, sections, estimates, ensembles, orbits, boundary values, tables, of models with events and inputs, from starts and over steps and spans of all sizes. None
-//! may panic, and none may give a number that is not finite as a result. `FUZZ_CALLS=100000 cargo test --release -p tfe-light-tests --test fuzz_calls` tries as many, `FUZZ_SEED=2` others.
+//! Random calls other than plain runs: derivatives, sections, estimates, ensembles, orbits, boundary values and tables,
+//! for models with events and inputs, with initial states, steps and spans of all sizes. No call may panic, and none
+//! may return a number that is not finite. `FUZZ_CALLS=100000 cargo test --release -p tfe-light-tests --test
+//! fuzz_calls` makes as many calls, `FUZZ_SEED=2` others.
 
 #[path = "common/random.rs"]
 mod random;
@@ -86,7 +88,7 @@ const MOTIONS: [&str; 3] = ["run and its output", "run_estimated", "Ensemble::ru
 
 const SOLUTIONS: [&str; 3] = ["section", "PeriodicOrbit::solve", "BoundaryValue::solve"];
 
-/// How many calls gave something, and how many were refused.
+/// How many calls returned a result, and how many were refused.
 type Count = BTreeMap<&'static str, [u32; 2]>;
 
 const MOST_STEPS: f64 = 300.0;
@@ -107,22 +109,22 @@ fn told(error: &dyn std::error::Error) {
     assert!(!error.to_string().is_empty());
 }
 
-/// Looks at what a call gave; false where it was refused.
+/// Checks the result of a call; returns false if it was refused.
 fn found<T, E: std::error::Error>(outcome: Result<T, E>, look: impl FnOnce(T)) -> bool {
     outcome.inspect_err(|error| told(error)).map(look).is_ok()
 }
 
-/// The same of a run, with what there is of it where it was refused.
+/// The same for a run, including the partial motion of a refused one.
 fn ran<T, const N: usize>(outcome: Result<T, RunError<N>>, look: impl FnOnce(T)) -> bool {
     if let Err(error) = &outcome {
-        // The start itself may be what was refused.
+        // The initial state itself may be the reason for the refusal.
         let behind = error.partial().states().get(1..).unwrap_or_default();
         assert!(all_finite(behind), "partial");
     }
     found(outcome, look)
 }
 
-/// An act of its own, or one that shows the state reached.
+/// A random act for an event; some of them use the state that was reached.
 fn act<const N: usize>(
     random: &mut Random,
 ) -> impl Fn(&Occurrence<'_, N>) -> Act<N> + Send + Sync + 'static {
@@ -138,7 +140,7 @@ fn act<const N: usize>(
     }
 }
 
-/// A start, a step and a span; the start mostly consistent with constraints.
+/// A random initial state, step and span; the state mostly satisfies the constraints.
 fn place<M, const N: usize>(model: &M, random: &mut Random) -> (State<N>, f64, Range<f64>)
 where
     M: Model<N> + Declared<N, Length = FixedLength>,
@@ -165,7 +167,7 @@ where
     (start, step, from..to)
 }
 
-/// A call, and whether it gave something.
+/// Makes a random call; returns whether it had a result.
 fn call<M, const N: usize>(model: &M, which: &str, random: &mut Random) -> Option<bool>
 where
     M: Model<N> + Declared<N, Length = FixedLength> + Clone + Send + Sync,
@@ -174,7 +176,7 @@ where
     let steps = ((span.end - span.start) / step).abs();
     let is_fast = start.p.iter().any(|p| (1e4..f64::MAX).contains(&p.abs()));
     if steps > MOST_STEPS || which == "hessian" && is_fast {
-        return None; // it would take longer than it tells
+        return None; // it would take too long
     }
     let element = random.element();
     let mut run: Simulation<'_, M, N> = Simulation::new(model).element(element).step(step);
@@ -201,7 +203,7 @@ where
     };
     Some(match which {
         "run and its output" => ran(run.run(start, span), |motion| {
-            // Velocities are NaN where a mass is zero, as their page says.
+            // Velocities are NaN if a mass is zero, as documented.
             for node in motion.states() {
                 assert!(is_finite(&node.state()), "{node:?}");
                 let here = motion.at(node.t).expect("a node");
@@ -230,7 +232,7 @@ where
             }
         }),
         "section" => {
-            // From where the last point is not far.
+            // A guess close to the last point.
             if !(step > 0.05 && span.start > -3.0 && span.start < 9.0) {
                 return None;
             }
@@ -289,7 +291,7 @@ where
     })
 }
 
-/// The model with an input: a line, or a table.
+/// The model with an input, a line or a table.
 fn driven<'m, M, const N: usize>(model: &'m M, random: &mut Random) -> Option<Driven<'m, M>>
 where
     M: tfe::runtime::Controlled<N> + Declared<N, Length = FixedLength>,
@@ -313,7 +315,7 @@ where
     }
 }
 
-/// Calls of these kinds.
+/// Makes calls of these kinds.
 fn random_calls(kinds: &[&'static str]) {
     let calls = setting("FUZZ_CALLS").unwrap_or(20 * kinds.len() as u32);
     let mut random = Random(setting("FUZZ_SEED").unwrap_or(1).into());
@@ -343,7 +345,7 @@ fn random_calls(kinds: &[&'static str]) {
         }
     }
     println!("{count:?}");
-    // It is no test if nothing is found.
+    // A test in which all calls are refused would say nothing.
     for which in kinds {
         let [right, refused] = count[which];
         assert!(

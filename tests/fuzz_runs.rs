@@ -1,6 +1,7 @@
-//! Random runs: models with singular points, masses of any size and sign, steps from far too short to absurd, all elements and iterations. None may panic, and none may show a
-//! state or an energy that is not finite without saying so. `FUZZ_RUNS=1000000 cargo test --release --test fuzz_runs` tries as many,
-//! `FUZZ_SEED=2` others.
+//! Random runs: models with singularities, masses of any size and sign, steps from far too short to absurdly long, all
+//! elements and iterations. No run may panic, and none may return a state or an energy that is not finite without an
+//! error or a warning. `FUZZ_RUNS=1000000 cargo test --release --test fuzz_runs` makes as many runs, `FUZZ_SEED=2`
+//! others.
 
 #[path = "common/random.rs"]
 mod random;
@@ -77,7 +78,7 @@ struct Oscillator {
     k: f64,
 }
 
-/// What has come of the runs.
+/// The counts of the runs.
 #[derive(Debug, Default)]
 struct Count {
     right: u32,
@@ -90,7 +91,7 @@ fn is_finite<const N: usize>(node: &Node<N>) -> bool {
     numbers.copied().all(f64::is_finite) && node.t.is_finite()
 }
 
-/// One run of a model.
+/// Makes one run of a model.
 fn one<M, const N: usize>(model: &M, is_tame: bool, random: &mut Random, count: &mut Count)
 where
     M: Model<N> + Declared<N, Length = FixedLength>,
@@ -131,7 +132,7 @@ where
         run = run.tolerance(10_f64.powf(random.between(-16.0, 1.0)));
     }
     let end = from + f64::from(steps) * step;
-    // Others would take millions of steps, as they should.
+    // Other accuracies would rightly take millions of steps.
     let numbers = start.q.iter().chain(&start.p);
     let is_short = f64::from(steps) * step < 3.0;
     let is_tame =
@@ -172,7 +173,7 @@ where
     }
 }
 
-// Two of one kind, so that they run side by side.
+// Two tests of the same kind, so that they run in parallel.
 #[test]
 fn random_runs_neither_panic_nor_hide_what_is_not_finite() {
     random_runs(setting("FUZZ_SEED").unwrap_or(1));
@@ -213,6 +214,6 @@ fn random_runs(seed: u32) {
         assert!(outcome.is_ok(), "run {run}, seed {seed}, model {which}");
     }
     println!("{count:?}");
-    // It is no test if nothing runs.
+    // A test in which nothing runs would say nothing.
     assert!(count.right > runs / 4, "{count:?}");
 }

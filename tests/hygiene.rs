@@ -1,53 +1,53 @@
-//! Generated code lives with whatever surrounds it.
+//! Hygiene of the generated code: it compiles whatever names, lints and items surround it.
 
 #![deny(missing_docs, warnings)]
 #![allow(non_camel_case_types)]
 
 use tfe::prelude::*;
 
-/// Names of the standard library that mean something else here.
+/// Names of the standard library and the prelude that are redefined here.
 pub mod shadowed {
     #![allow(dead_code)]
 
-    /// Not `core::result::Result`.
+    /// Hides `core::result::Result`.
     pub struct Result;
-    /// Not `core::option::Option`.
+    /// Hides `core::option::Option`.
     pub struct Option;
-    /// Not `f64`, in the namespace of modules.
+    /// Hides `f64`, in the namespace of modules.
     pub mod core {}
-    /// Nor `std`.
+    /// Hides `std`.
     pub mod std {}
-    /// A trait with the methods of the scalar.
+    /// A trait with methods of the same names as those of the scalar type.
     pub trait Real {
-        /// Not the sine.
+        /// Hides the sine.
         fn sin(&self) {}
     }
     impl Real for f64 {}
-    /// Not the constructor.
+    /// Hides the constructor.
     pub struct Ok;
-    /// Not the scalar parameter.
+    /// Hides the scalar parameter.
     pub struct R;
-    /// Not the constructor.
+    /// Hides the constructor.
     pub struct Some;
-    /// Nor this one.
+    /// Hides the constructor.
     pub struct None;
-    /// Nor this one.
+    /// Hides the constructor.
     pub struct Err;
-    /// Not `alloc::vec::Vec`.
+    /// Hides `alloc::vec::Vec`.
     pub struct Vec;
-    /// Not `alloc::string::String`.
+    /// Hides `alloc::string::String`.
     pub struct String;
-    /// Not `alloc::boxed::Box`.
+    /// Hides `alloc::boxed::Box`.
     pub struct Box;
-    /// Not `core::default::Default`.
+    /// Hides `core::default::Default`.
     pub struct Default;
-    /// Not `core::clone::Clone`.
+    /// Hides `core::clone::Clone`.
     pub struct Clone;
-    /// Not `core::convert::Into`.
+    /// Hides `core::convert::Into`.
     pub struct Into;
-    /// Not `core::iter::Iterator`.
+    /// Hides `core::iter::Iterator`.
     pub struct Iterator;
-    /// Not the primitive type, in the namespace of modules.
+    /// Hides the primitive type, in the namespace of modules.
     pub mod f64 {}
 
     #[tfe::dynamics(
@@ -58,7 +58,7 @@ pub mod shadowed {
         solver(Solver, Mixed::<3>),
         model(Small, truncated(2)),
     )]
-    /// A model among them.
+    /// A model among these names.
     pub struct First {
         /// Mass.
         pub m: f64,
@@ -66,7 +66,7 @@ pub mod shadowed {
         pub k: f64,
     }
 
-    /// Constraints on positions and velocities, and derivatives by parameters.
+    /// Constraints on positions and velocities, and sensitivities to parameters.
     #[tfe::dynamics(
         coordinates(x, y),
         lagrangian = m/2*(dot(x)^2 + dot(y)^2) - w[1]*y,
@@ -82,7 +82,7 @@ pub mod shadowed {
         pub w: [f64; 3],
     }
 
-    /// A model of run-time length with constraints and outputs by site.
+    /// A model of run-time length with constraints and outputs at each site.
     #[tfe::dynamics(
         coordinates(q[n]),
         lagrangian = sum(i in 0..n, dot(q[i])^2/2) - q[n-2]^2/2,
@@ -95,19 +95,20 @@ pub mod shadowed {
         pub n: usize,
     }
 
-    /// A model of a length known to the compiler, with an index that it checks.
+    /// A model with a const length and an index that is checked at compile time.
     #[tfe::dynamics(coordinates(q[N]), lagrangian = sum(i in 0..N, dot(q[i])^2/2) - q[N-2]^2/2)]
     pub struct Fourth<const N: usize> {}
 }
 
-/// Without the prelude of Rust, and where the name of the crate is taken.
+/// Without the prelude of Rust, and with the name of the crate taken by something else.
 pub mod without_prelude {
     #![no_implicit_prelude]
 
-    /// Not the crate.
+    /// Hides the crate.
     pub mod tfe {}
 
-    /// Pairs whose forces add up to zero, so many that they stay in loops; parameters are called like the sums of these.
+    /// Pairs of bodies whose forces cancel, so many that they remain loops. The parameters are named like the variables
+    /// of these loops.
     #[::tfe::dynamics(
         coordinates(x[18]),
         lagrangian = sum(i in 0..18, sums/2*dot(x[i])^2) + sum(i in 0..18, sum(j in 0..i, sum_*column*cos(x[i] - x[j]))),
@@ -120,11 +121,11 @@ pub mod without_prelude {
         pub sum_: f64,
         /// A factor.
         pub column: f64,
-        /// Another.
+        /// Another factor.
         pub row: f64,
     }
 
-    /// The same of any length.
+    /// The same model with run-time length.
     #[::tfe::dynamics(
         coordinates(x[N]),
         lagrangian = sum(i in 0..N, dot(x[i])^2/2) + sum(i in 0..N, sum(j in 0..i, k*cos(x[i] - x[j]))),
@@ -134,7 +135,7 @@ pub mod without_prelude {
         pub k: f64,
     }
 
-    /// Forces in one loop, which is taken in strides; parameters and outputs are called like what is in it.
+    /// Forces in one loop that is executed in strides. Parameters and outputs are named like the variables in it.
     #[::tfe::dynamics(
         coordinates(q[n]),
         lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, __to/2*(q[i+1] - q[i])^2 + __end*(q[i+1] - q[i])^4),
@@ -149,7 +150,7 @@ pub mod without_prelude {
         pub __end: f64,
     }
 
-    /// A solver, and a model made from this one.
+    /// A solver, and a model derived from this one.
     #[::tfe::dynamics(
         coordinates(x, y),
         lagrangian = (dot(x)^2 + dot(y)^2)/2 - k*select(y < 1, y^2, 2*y - 1),
@@ -163,24 +164,24 @@ pub mod without_prelude {
     }
 }
 
-/// Fields named like the emitter's own variables.
+/// Fields named like variables of the generated code.
 #[dynamics(
     coordinates(x),
     lagrangian = q/2*dot(x)^2 - z*x^2/2 - t1*cos(x) - first*x^4 - second*sin(2*x) - sin_x*x^3,
     output(values) = x*q,
 )]
 pub struct Taken {
-    /// Like the coordinates.
+    /// Named like the coordinates.
     pub q: f64,
-    /// Like the velocities.
+    /// Named like the velocities.
     pub z: f64,
-    /// Like a temporary.
+    /// Named like a temporary.
     pub t1: f64,
-    /// Like the results.
+    /// Named like the results.
     pub first: f64,
-    /// Like more of them.
+    /// Named like other results.
     pub second: f64,
-    /// Like the sine of the coordinate.
+    /// Named like the sine of the coordinate.
     pub sin_x: f64,
 }
 
@@ -191,7 +192,7 @@ pub struct Raw {
     pub r#type: f64,
 }
 
-/// Keywords of all editions.
+/// Keywords of different editions.
 #[dynamics(coordinates(r#dyn), lagrangian = r#gen/2*dot(r#dyn)^2 - r#async*sin(r#dyn), output(r#try) = r#dyn)]
 pub struct Keywords {
     /// A keyword since 2024.
@@ -210,7 +211,7 @@ pub struct Keywords {
 )]
 pub struct Kernels {}
 
-/// Fields that cannot be borrowed.
+/// Fields of a packed struct, which cannot be borrowed.
 #[dynamics(
     coordinates(x),
     lagrangian = m/2*dot(x)^2 - k*cos(x),
@@ -225,7 +226,7 @@ pub struct Packed {
     pub k: f64,
 }
 
-/// A bound, and a destructor.
+/// A struct with a trait bound and a destructor.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - sum(i in 0..N, w[i]*x^2))]
 pub struct Bounded<const N: usize>
 where
@@ -242,7 +243,7 @@ where
     fn drop(&mut self) {}
 }
 
-/// Lints that users may deny, and every visibility.
+/// Lints that users may deny, and all visibilities.
 pub mod strict {
     #![deny(
         clippy::pedantic,
@@ -251,7 +252,7 @@ pub mod strict {
         unused_qualifications
     )]
 
-    /// Seen by all.
+    /// Visible everywhere.
     #[tfe::dynamics(
         coordinates(x, y),
         lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
@@ -269,21 +270,21 @@ pub mod strict {
         pub g: f64,
     }
 
-    /// Seen in the crate.
+    /// Visible in the crate.
     #[tfe::dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - x^2/2, solver(CrateStepper, Mixed::<3>), model(CrateNear, truncated(2)))]
     #[derive(Clone, Copy, Debug)]
     pub(crate) struct OfCrate {
         pub(crate) m: f64,
     }
 
-    /// Seen in a path.
+    /// Visible in a path.
     #[tfe::dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - x^2/2, solver(PathStepper, Mixed::<3>), model(PathNear, truncated(2)))]
     #[derive(Clone, Copy, Debug)]
     pub(in super::strict) struct OfPath {
         pub(in super::strict) m: f64,
     }
 
-    /// The momentum of a velocity of one, of all but the first.
+    /// The momentum that belongs to velocity one, for all models but the first.
     pub(crate) fn momenta() -> [f64; 2] {
         let (own, path) = (OfCrate { m: 2.0 }, OfPath { m: 3.0 });
         let near = PathNear::of(&path);
@@ -291,7 +292,7 @@ pub mod strict {
     }
 }
 
-/// A model that is no longer recommended, with a field that is not either.
+/// A deprecated model with a deprecated field.
 #[deprecated]
 #[dynamics(
     coordinates(x),
@@ -310,7 +311,7 @@ pub struct Old {
 
 macro_rules! oscillator {
     ($name:ident, $potential:expr) => {
-        /// From a macro.
+        /// A model declared by a macro.
         #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - 2*$potential)]
         pub struct $name {}
     };
@@ -323,21 +324,21 @@ mod elsewhere {
     pub use tfe as dynamics_engine;
 }
 
-/// Finds the crate where it is told to.
+/// The path of the crate is given as an argument.
 #[dynamics(crate = elsewhere::dynamics_engine, coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
 pub struct Renamed {}
 
 macro_rules! renamed {
     ($name:ident, $path:path) => {
-        /// Finds the crate from where the macro is.
+        /// The path of the crate is relative to where the macro is defined.
         #[dynamics(crate = $crate::elsewhere::dynamics_engine, coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
         pub struct $name {}
 
-        /// Finds the crate at a path that the macro is given.
+        /// The path of the crate is an argument of the macro.
         pub mod at_path {
             use super::elsewhere;
 
-            /// A model there.
+            /// A model declared there.
             #[tfe::dynamics(crate = $path, coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
             pub struct AtPath {}
         }
@@ -348,7 +349,7 @@ renamed!(FromMacro, elsewhere::dynamics_engine);
 
 macro_rules! spring {
     ($vis:vis $name:ident { $mass:ident, $stiffness:ident } $solver:ident) => {
-        /// Names of fields from a macro.
+        /// Names of fields passed to a macro.
         #[dynamics(coordinates(x), lagrangian = $mass/2*dot(x)^2 - $stiffness/2*x^2, solver($solver, Mixed::<2>))]
         $vis struct $name {
             /// Mass.
@@ -361,14 +362,14 @@ macro_rules! spring {
 
 spring!(pub Spring { out, self_ } SpringSolver);
 
-/// A constant called like a parameter.
+/// A constant with the name of a parameter.
 pub mod constants {
     #![allow(non_snake_case)]
 
-    /// Not the parameter.
+    /// Has the name of the parameter.
     pub const G: u8 = 0;
 
-    /// A model beside it.
+    /// A model next to it.
     #[tfe::dynamics(coordinates(x), lagrangian = dot(x)^2/2 - G*x)]
     pub struct Falling {
         /// The parameter.
@@ -378,7 +379,7 @@ pub mod constants {
 
 macro_rules! chain {
     ($name:ident, $length:expr, $masses:ty) => {
-        /// Length and type from a macro.
+        /// A length and a type passed to a macro.
         #[dynamics(coordinates(q[$length]), lagrangian = sum(i in 0..$length, m[i]/2*dot(q[i])^2 - q[i]^2/2))]
         pub struct $name {
             /// Masses.
@@ -389,17 +390,18 @@ macro_rules! chain {
 
 chain!(Three, 3, [f64; 3]);
 
-/// Greek letters.
+/// Greek letters as names.
 #[dynamics(coordinates(θ), lagrangian = μ/2*dot(θ)^2 + μ*cos(θ), output(sinus) = sin(θ))]
 pub struct Greek {
     /// Mass.
     pub μ: f64,
 }
 
-/// A field like the cosine of a coordinate whose name ends in an underscore, as fields of such names are renamed.
+/// A field named like the cosine of a coordinate whose name ends in an underscore, which is how clashing fields are
+/// renamed.
 #[dynamics(coordinates(phi_), lagrangian = dot(phi_)^2/2 - cos_phi*sin(phi_))]
 pub struct Underscored {
-    /// Not the cosine.
+    /// Named like the cosine.
     pub cos_phi: f64,
 }
 
@@ -463,7 +465,7 @@ fn they_all_move() {
     Model::first(&underscored, 0.0, &[1.0], &[0.0], &mut derivatives);
     assert_eq!(derivatives.q, [-3.0 * 1.0_f64.cos()]);
 
-    // The substituted expression binds as a whole: L_q = −2 (2x + 4x³) = −12 at x = 1.
+    // The substituted expression must be treated as one operand: L_q = −2 (2x + 4x³) = −12 at x = 1.
     let soft = Soft {};
     let mut derivatives = tfe::runtime::First::<f64, 1>::ZERO;
     Model::first(&soft, 0.0, &[1.0], &[0.0], &mut derivatives);
@@ -484,7 +486,8 @@ fn they_move_without_a_prelude() {
     (q[0], q[17]) = (0.1, 0.3);
     assert_eq!(ring.state(q, [1.0; 18]).p, [2.0; 18]);
     assert!((ring.spread(0.0, q, [0.0; 18]) - 0.8).abs() < 1e-15);
-    // The derivative of the balanced forces by all angles at once vanishes, row by row, in both kinds of loops.
+    // The forces between pairs cancel, so that the sum of each row of derivatives by all angles is zero; in both kinds
+    // of loops.
     let mut derivatives = tfe::runtime::First::<f64, 18>::ZERO;
     let mut second = tfe::runtime::Second::<f64, 18>::ZERO;
     let any = AnyRing::<18> { k: 1.5 };

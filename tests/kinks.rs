@@ -1,4 +1,4 @@
-//! Forces with kinks and jumps: elements keep their order, and an accuracy that is asked for is met or refused.
+//! Forces with kinks and jumps: elements keep their order of accuracy, and an accuracy asked for is met or refused.
 
 #[path = "common/largest.rs"]
 mod largest;
@@ -9,14 +9,14 @@ use tfe::runtime::length::{Declared, FixedLength};
 use tfe::runtime::{Model, StepError};
 use tfe::{RunErrorKind, Warning};
 
-/// Bounces on a spring.
+/// A mass that bounces on a one-sided spring.
 #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y - k/2*min(y, 0)^2)]
 struct Bounce {
     g: f64,
     k: f64,
 }
 
-/// A mass driven against friction that jumps with the direction.
+/// A driven mass with Coulomb friction, which jumps with the direction of motion.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - x^4/4, force(x) = -c*sign(dot(x)) + a*sin(w*t))]
 struct Coulomb {
     c: f64,
@@ -24,7 +24,7 @@ struct Coulomb {
     w: f64,
 }
 
-/// The same, smoothed.
+/// The same with smoothed friction.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - x^4/4, force(x) = -c*tanh(dot(x)/w) + a*sin(t))]
 struct Smoothed {
     c: f64,
@@ -40,26 +40,26 @@ struct Backlash {
     a: f64,
 }
 
-/// Thrust for some time.
+/// Thrust during some time.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - cos(x), force(x) = select(t < until, thrust, 0))]
 struct ThrustInTime {
     until: f64,
     thrust: f64,
 }
 
-/// Thrust in a place.
+/// Thrust in some region.
 #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 + 1/sqrt(x^2 + y^2), force(x) = select(x > y + 0.1, thrust, 0))]
 struct ThrustInPlace {
     thrust: f64,
 }
 
-/// A pendulum held upright by a limited torque.
+/// An inverted pendulum stabilised by a limited torque.
 #[dynamics(coordinates(a), lagrangian = dot(a)^2/2 - cos(a), force(a) = max(-m, min(m, -3*a - 2*dot(a))))]
 struct Saturated {
     m: f64,
 }
 
-/// A charge on one of two capacitors, chosen by its sign.
+/// A charge on one of two capacitors, depending on its sign.
 #[dynamics(coordinates(q), lagrangian = dot(q)^2/2 - q^2/(2*select(q > 0, c, 3*c)), force(q) = -0.05*dot(q) + sin(t))]
 struct Capacitors {
     c: f64,
@@ -74,35 +74,35 @@ struct Impact {
     w: f64,
 }
 
-/// A potential like a roof.
+/// A potential with a kink at its top.
 #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*abs(x) - y^2/2 - x^2*y/4)]
 struct Roof {
     g: f64,
 }
 
-/// By momenta: a magnet on one side.
+/// A Hamiltonian: a magnet on one side.
 #[dynamics(coordinates(q[2]), momenta(p[2]), hamiltonian = (p[0]^2 + p[1]^2)/2 + q[0]^2*q[1]^2/2 + b*max(q[0], 0)*q[0] + (q[0]^2 + q[1]^2)/2)]
 struct HalfSpring {
     b: f64,
 }
 
-/// Quadratic drag changes its sign with the velocity: a kink in the second derivative of the force.
+/// Quadratic drag, whose sign depends on the velocity: a kink in the second derivative of the force.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + cos(x), force(x) = -c*abs(dot(x))*dot(x) + 0.5*sin(1.3*t))]
 struct Drag {
     c: f64,
 }
 
-/// A scene as it is run here.
+/// A scene and how it is run.
 struct Scene<'a> {
     name: &'static str,
     /// A step with which elements show their order.
     step: f64,
     run: Box<dyn Fn(Element, f64, bool) -> Ended + 'a>,
-    /// With a requested accuracy: the end and the estimate, or the error.
+    /// Runs with an accuracy: returns the end and the estimate, or the error.
     accurate: Box<dyn Fn(f64) -> Result<Estimate, String> + 'a>,
 }
 
-/// An end and its estimated error.
+/// The end state and its estimated error.
 type Estimate = (Vec<f64>, f64);
 
 struct Ended {
@@ -256,7 +256,7 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
         .fold(0.0, |most, (a, b)| larger(most, (a - b).abs()))
 }
 
-/// Cut at kinks, elements keep their order; across them all have the first or second.
+/// With steps cut at kinks, elements keep their order; with elements across kinks, all have order one or two.
 fn elements_keep_their_order(which: impl Fn(&Scene<'_>) -> bool) {
     for scene in scenes().into_iter().filter(which) {
         let fine = (scene.run)(Element::mixed(8), scene.step / 4.0, true);
@@ -266,7 +266,8 @@ fn elements_keep_their_order(which: impl Fn(&Scene<'_>) -> bool) {
             (Element::radau(4), 5.0),
             (Primal::<4>.lobatto(), 6.0),
         ] {
-            // A jump by the velocity: points at the ends of an element see that of the polynomial, which is on either side.
+            // For a jump that depends on the velocity, quadrature points at the ends of an element see the velocity of
+            // the polynomial, which may be on either side of the jump.
             if scene.name == "dry friction" && element == Primal::<4>.lobatto() {
                 continue;
             }
@@ -274,7 +275,7 @@ fn elements_keep_their_order(which: impl Fn(&Scene<'_>) -> bool) {
             let runs = steps.map(|step| (scene.run)(element, step, true));
             let errors = runs.each_ref().map(|run| apart(&run.end, &fine.end));
             let name = scene.name;
-            // Over two halvings; the last errors may be roundings, which crossings let grow.
+            // The order over two halvings; the last errors may be rounding errors, which crossings amplify.
             let measured = (0..2).map(|k| (errors[k] / errors[k + 2]).log2() / 2.0);
             let most = measured.fold(0.0, larger);
             assert!(
@@ -284,7 +285,7 @@ fn elements_keep_their_order(which: impl Fn(&Scene<'_>) -> bool) {
             assert_eq!(runs[3].kinks, fine.kinks, "{name} {element}");
             let across = (scene.run)(element, steps[3], false);
             assert_eq!(across.kinks, 0);
-            // The smooth scene is the same run; elsewhere an element across a kink has the first or second order.
+            // For the smooth scene both runs are the same; in the others an element across a kink has order one or two.
             let ratio = apart(&across.end, &fine.end) / errors[3].max(1e-13);
             assert!(
                 fine.kinks == 0 || ratio > 3.0,
@@ -294,7 +295,7 @@ fn elements_keep_their_order(which: impl Fn(&Scene<'_>) -> bool) {
     }
 }
 
-// Parts of one test, so that they run side by side.
+// Parts of one test, so that they run in parallel.
 #[test]
 fn elements_keep_their_order_in_short_steps() {
     elements_keep_their_order(|scene| scene.step < 0.05);
@@ -305,7 +306,7 @@ fn elements_keep_their_order_in_long_steps() {
     elements_keep_their_order(|scene| scene.step >= 0.05);
 }
 
-/// What is asked for is met.
+/// The accuracy asked for is met.
 #[test]
 fn an_accuracy_is_met() {
     for scene in scenes() {
@@ -315,7 +316,7 @@ fn an_accuracy_is_met() {
             let (end, estimate) = (scene.accurate)(accuracy)
                 .unwrap_or_else(|error| panic!("{} {accuracy:e}: {error}", scene.name));
             let error = apart(&end, &fine.end);
-            // The estimate is of the whole span, relative to the largest coordinate and momentum there.
+            // The estimate is for the whole span, relative to its largest coordinate and momentum.
             assert!(
                 error < accuracy * (1.0 + largest),
                 "{} {accuracy:e}: {error:.1e}",
@@ -326,7 +327,7 @@ fn an_accuracy_is_met() {
     }
 }
 
-/// Where friction holds, the motion slides along v = 0: the equations as declared do not say how.
+/// If friction sticks, the motion stays at v = 0, and the equations as declared do not define it.
 #[test]
 fn sliding_is_told() {
     let held = Coulomb {
@@ -346,7 +347,7 @@ fn sliding_is_told() {
             panic!("{element}: {error}");
         };
         assert_eq!(source, StepError::Slides, "{element}");
-        // x'' = −x − x³ − 3 + 0.5 sin 1.3t from (1, 1): it stops after 0.2.
+        // x'' = −x − x³ − 3 + 0.5 sin 1.3t from (1, 1) comes to rest after 0.2.
         assert!((0.1..0.3).contains(&time), "{element}: {time}");
         assert!(error.partial().last().t > 0.05);
     }
@@ -357,7 +358,7 @@ fn sliding_is_told() {
     assert!(error.to_string().contains("slides"), "{error}");
 }
 
-/// A force that is switched off at a time.
+/// A force that is switched off at a given time.
 #[test]
 fn jumps_in_time_are_found() {
     let free = Free { until: 0.55 };
@@ -402,7 +403,8 @@ fn jumps_in_time_are_found() {
     }
 }
 
-/// A jump at a node of the grid is no step of length zero, and points at the ends of elements see the force of their own element.
+/// A jump at a node of the grid does not lead to a step of length zero, and quadrature points at the ends of elements
+/// see the force of their own element.
 #[test]
 fn jumps_at_nodes_are_passed() {
     fn check(what: &str, until: f64, run: Simulation<'_, impl Model<1>, 1>) {
@@ -425,19 +427,19 @@ fn jumps_at_nodes_are_passed() {
     }
 }
 
-/// Force for some time.
+/// A force during some time.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, force(x) = select(t < until, 1, 0))]
 struct Free {
     until: f64,
 }
 
-/// As before, with the force on the boundary.
+/// The same with the force at the boundaries of the interval.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, force(x) = select(t <= until, 1, 0))]
 struct Held {
     until: f64,
 }
 
-/// Models without kinks step as ever, to the bit.
+/// Models without kinks give the same bits with and without the option.
 #[test]
 fn smooth_models_are_not_touched() {
     #[dynamics(coordinates(a), lagrangian = dot(a)^2/2 + cos(a), force(a) = sin(t))]
@@ -450,7 +452,7 @@ fn smooth_models_are_not_touched() {
     assert_eq!(plain.statistics(), asked.statistics());
 }
 
-/// Runs of an ensemble are those of a simulation, to the bit.
+/// The runs of an ensemble have the same bits as those of a simulation.
 #[test]
 fn ensembles_are_cut_at_kinks() {
     let starts: Vec<_> = (1..=20)
@@ -469,13 +471,13 @@ fn ensembles_are_cut_at_kinks() {
     }
     assert_eq!(ends.statistics().kinks, kinks);
     assert!(kinks > 40, "{kinks}");
-    // In parts, too.
+    // Also as a continued run.
     let mut parts = cut.begin(&starts, 0.0).expect("starts");
     let middle = parts.run_to(0.4).expect("runs");
     let end = parts.run_to(1.0).expect("runs");
     let both = middle.statistics().kinks + end.statistics().kinks;
     assert_eq!((both, end.into_results()), (kinks, ends.into_results()));
-    // And back, off the grid; a time that is none changes nothing.
+    // And backwards, off the grid; an empty span changes nothing.
     assert!(parts.run_to(f64::NAN).is_err());
     let back = parts.run_to(-0.013).expect("runs back");
     let ahead = parts.run_to(0.0).expect("runs");
@@ -487,7 +489,7 @@ fn ensembles_are_cut_at_kinks() {
     assert!(none.run_to(1.0).expect("nothing").is_empty());
     let across = ensemble.run(&starts, 0.0..1.0).expect("runs");
     assert_eq!(across.statistics().kinks, 0);
-    // A motion that slides is the failure of its run.
+    // A sliding motion is an error of its own run only.
     let held = Coulomb {
         c: 3.0,
         a: 0.5,
@@ -499,7 +501,8 @@ fn ensembles_are_cut_at_kinks() {
     assert_eq!((ends.nodes().count(), ends.failures().count()), (0, 1));
 }
 
-/// Steps have their length far from zero, too, where differences of times have it to some digits: those of 0.01 were short by 1e-8 at 1e9, all of them.
+/// Steps have the right length at large times, too, where differences of times have few digits: at t = 1e9, steps of
+/// 0.01 were too short by 1e-8.
 #[test]
 fn late_steps_beside_kinks_keep_their_length() {
     let end = |start: f64, h: f64| {
@@ -509,7 +512,7 @@ fn late_steps_beside_kinks_keep_their_length() {
         (run.last().q[0], run.last().v[0])
     };
     for start in [1e6, 1e9, -1e9] {
-        // Falls from 5, by 1.25 m, and far from the spring; back in time likewise.
+        // Falls by 1.25 m from 5 m, far above the spring; the same backwards in time.
         let (q, v) = end(start, 0.01);
         assert!(
             (q - 3.75).abs() < 1e-12 && (v + 5.0).abs() < 1e-12,
@@ -523,7 +526,7 @@ fn late_steps_beside_kinks_keep_their_length() {
     }
 }
 
-/// What cannot be cut there says so.
+/// Runs that cannot cut steps at kinks refuse the option.
 #[test]
 fn what_cannot_be_cut_at_kinks_is_refused() {
     let start = BOUNCE.state([0.1], [0.0]);
@@ -534,13 +537,14 @@ fn what_cannot_be_cut_at_kinks_is_refused() {
         matches!(kind, RunErrorKind::KinksUnsupported { .. }),
         "{kind}"
     );
-    // A smooth model has none.
+    // A smooth model has no kinks to cut at.
     let smooth = Simulation::new(&SMOOTHED).step(0.02).at_kinks(true);
     let start = SMOOTHED.state([1.0], [0.0]);
     smooth.run_linearised(start, 0.0..1.0).expect("a run");
 }
 
-/// A cut moves with the start; where the force jumps, a derivative that does not know it would be wrong.
+/// The time of a cut depends on the initial state. If the force jumps there, a derivative that neglects this would be
+/// wrong: it is refused.
 #[test]
 fn derivatives_of_steps_cut_at_kinks_are_refused() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - g*abs(x), output(place) = x)]
@@ -570,7 +574,8 @@ fn derivatives_of_steps_cut_at_kinks_are_refused() {
     assert!((point.t - 1.2_f64.sqrt()).abs() < 1e-12);
 }
 
-/// A structure at rest, whose sites begin to move one after the other: signs of what moves by powers of a small time are no kinks where gaps are open.
+/// A structure at rest whose sites begin to move one after the other. Quantities that grow from zero as powers of a
+/// small time are not kinks, as long as all gaps are open.
 #[test]
 fn what_decides_nothing_cuts_nothing() {
     #[dynamics(
@@ -615,7 +620,8 @@ fn what_decides_nothing_cuts_nothing() {
     assert!(off < 1e-12, "{off:e}");
 }
 
-/// An estimate of runs that both go across a kink is doubtful, and says so; of cut ones, and of smooth models, it is not.
+/// If both runs of an estimate have elements across a kink, the estimate is unreliable, and there is a warning; with
+/// steps cut at kinks, and for smooth models, there is none.
 #[test]
 fn estimates_across_kinks_say_so() {
     let start = BOUNCE.state([1.0], [0.0]);
@@ -634,7 +640,7 @@ fn estimates_across_kinks_say_so() {
     assert!(!smooth.warnings().contains(&Warning::KinksCrossed));
 }
 
-/// An element that ends at an event is cut at the kinks before it, as the element that was to be: a cord that goes slack, and a wall.
+/// An element that ends at an event is also cut at the kinks before it: a cord that goes slack, and a wall.
 #[test]
 fn times_of_events_behind_a_kink_are_as_accurate() {
     #[dynamics(

@@ -1,10 +1,11 @@
-//! Rounding over long runs: no drift, and its growth is that of a random walk.
+//! Rounding errors over long runs: there is no drift, and they grow only as a random walk, with the square root of the
+//! number of steps.
 
 use tfe::prelude::*;
 use tfe::runtime::legendre::energy;
 use tfe::runtime::step::{Control, Stepper};
 
-// Not all of them are run for long.
+// Only some of the scenes are run for long.
 #[allow(dead_code)]
 #[path = "../examples/speed_accuracy/scenes/mod.rs"]
 mod scenes;
@@ -12,7 +13,7 @@ mod scenes;
 use scenes::Start;
 use scenes::planets::{KEPLER_START, Kepler, SOLAR_SYSTEM, solar_system_start};
 
-/// An ellipse of eccentricity 0.6 whose pericentre lies in some direction.
+/// A Kepler ellipse of eccentricity 0.6, with its pericentre in a given direction.
 fn ellipse(angle: f64) -> State<2> {
     let (sin, cos) = angle.sin_cos();
     let (radius, speed) = (KEPLER_START.q[0], KEPLER_START.v[1]);
@@ -22,7 +23,7 @@ fn ellipse(angle: f64) -> State<2> {
     }
 }
 
-/// The planets, turned about the z axis.
+/// The planets, rotated about the z axis.
 fn planets(angle: f64) -> State<18> {
     let (sin, cos) = angle.sin_cos();
     let turned = |from: [f64; 18]| {
@@ -39,7 +40,7 @@ fn planets(angle: f64) -> State<18> {
     SOLAR_SYSTEM.state(turned(q), turned(v))
 }
 
-/// Relative errors of the energy after so many steps, a row for each start.
+/// The relative energy errors after given numbers of steps, one row for each initial state.
 fn energy_errors<M: Model<N>, const N: usize>(
     model: &M,
     element: Element,
@@ -70,7 +71,7 @@ fn energy_errors<M: Model<N>, const N: usize>(
     starts.iter().map(run).collect()
 }
 
-/// Mean and root mean square over all starts, a pair for each check.
+/// The mean and the root mean square over all initial states, a pair for each check.
 fn moments(errors: &[Vec<f64>]) -> Vec<[f64; 2]> {
     let count = errors.len() as f64;
     let checks = errors.first().map_or(0, Vec::len);
@@ -89,7 +90,8 @@ fn growth(moments: &[[f64; 2]], checks: &[usize]) -> f64 {
     (moments[last][1] / moments[first][1]).ln() / times.ln()
 }
 
-/// After a whole number of periods the planet is where it began. Compositions of leapfrog with compensated sums reach 1e-11.
+/// After whole periods the planet is back at its initial position. For comparison: compositions of leapfrog with
+/// compensated sums reach 1e-11.
 #[test]
 fn a_thousand_kepler_periods() {
     let steps = 4000;
@@ -123,15 +125,17 @@ fn kepler_energy_is_a_random_walk() {
     let moments = moments(&errors);
     let slope = growth(&moments, &checks);
     println!("energy error after 10 to 1000 periods {moments:?}, exponent {slope:.2}");
-    // A drift of one sign in all starts would give 1; the rounding of the energy itself makes it less than 1/2.
+    // A drift of the same sign in all runs would have the exponent 1, a random walk has 1/2; the rounding error in
+    // evaluating the energy itself makes it smaller.
     assert!(slope < 0.6, "{slope}");
     let [mean, rms] = moments[4];
     assert!(rms < 5e-15, "{rms:.1e}");
-    // No common sign: the mean of 24 walks is a fifth of one.
+    // There is no common sign: the mean of 24 random walks is about a fifth of one of them.
     assert!(mean.abs() < 0.6 * rms, "{mean:.1e} of {rms:.1e}");
 }
 
-/// Displacement elements whose points are more than their unknown rates; sums in working precision gave 4e-14 after a thousand periods, of one sign.
+/// Primal elements with more quadrature points than unknown rates. Sums in working precision gave errors of 4e-14 after
+/// a thousand periods, all of the same sign.
 #[test]
 fn displacement_elements_keep_the_energy_of_kepler_orbits() {
     let h = std::f64::consts::TAU / 64.0;
@@ -143,7 +147,7 @@ fn displacement_elements_keep_the_energy_of_kepler_orbits() {
         println!("{element}: energy error after 100 and 1000 periods {moments:?}");
         let [mean, rms] = moments[1];
         assert!(rms < 1e-14, "{element}: {rms:.1e}");
-        // The mean of twelve walks is 0.3 of one.
+        // The mean of twelve random walks is about 0.3 of one of them.
         assert!(mean.abs() < 0.9 * rms, "{element}: {mean:.1e} of {rms:.1e}");
     }
 }

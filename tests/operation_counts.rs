@@ -1,11 +1,11 @@
-//! Operation counts, pinned: a change of the engine shows here.
+//! Operation counts of the kernels are pinned: a change of the optimiser shows here.
 
 #[path = "../examples/operation_counts.rs"]
 mod example;
 
 use example::{MODELS, counted, least_published, weighted};
 
-/// Additions, multiplications, divisions, sine and cosine evaluations.
+/// Additions, multiplications, divisions, and evaluations of sine or cosine.
 const PINNED: [[usize; 4]; 5] = [
     [11, 18, 0, 4],
     [32, 45, 0, 6],
@@ -27,14 +27,15 @@ fn counts_are_pinned_and_below_all_published() {
 
 #[test]
 fn five_links_save_a_third() {
-    // 5 pairs of sine and cosine instead of 15: the 10 differences of angles follow from the angles.
+    // 5 pairs of sine and cosine instead of 15: those of the 10 differences of angles follow from those of the angles.
     let model = &MODELS[2];
     let counts = counted(model).expect("the declaration is right");
     assert!(3.0 * weighted(counts) <= 2.0 * least_published(model));
 }
 
-/// What the macro emits for a pendulum with gravity, mass and length: characters without spaces. All kernels, and nothing for what the model has not: no forces, no
-/// constraints, no outputs. Six hundred of them number the three parameters, by each of which motions are differentiated; fifty are quotation marks and commas of the page's lines.
+/// The size of the code generated for a pendulum with gravity, mass and length, in characters without spaces: all
+/// kernels, and nothing that the model does not need (no forces, constraints or outputs). About six hundred characters
+/// are for derivatives by the three parameters, and fifty are quotation marks and commas of documentation lines.
 #[test]
 fn emitted_code_keeps_to_a_budget() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tfe-macros/golden/pendulum.rs");

@@ -1,5 +1,6 @@
-//! The compiled kernels against the interpreter: the same declaration once through `#[dynamics]` and once through the engine, evaluated on
-//! the same numbers. Both run the same program, so that they agree to the last bit; only `powi` may round differently.
+//! The compiled kernels compared with the interpreter: the same declaration is processed by `#[dynamics]` and by the
+//! engine at run time, and both are evaluated at the same numbers. Both execute the same program, so that they agree to
+//! the last bit; only `powi` may round differently.
 
 use tfe::Model;
 use tfe::prelude::dynamics;
@@ -11,7 +12,7 @@ use tfe_symbolic::program::interpret::{Environment, Results, interpret};
 use tfe_symbolic::program::{self, Program, Request};
 use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 
-/// The engine's side of a model: derived at run time from the text of the declaration.
+/// The model in the engine: derived at run time from the text of the declaration.
 struct Oracle {
     derivation: Derivation,
     sensitivities: Vec<Parameter>,
@@ -62,7 +63,7 @@ impl Oracle {
         interpret(program, &self.environment).unwrap_or_else(|error| panic!("{error}\n{program}"))
     }
 
-    /// The time, or the parameter of this number.
+    /// The derivative by the time, or by the parameter of this number.
     fn value(&mut self, by: program::By) -> &mut f64 {
         let known = "a parameter with a value";
         match by {
@@ -78,7 +79,7 @@ impl Oracle {
         }
     }
 
-    /// The difference quotient of eighth order of the first derivatives and forces, and how large these are.
+    /// Difference quotients of eighth order of the first derivatives and forces, and the size of these.
     fn difference_quotient(&mut self, by: program::By) -> (Vec<f64>, f64) {
         let first = self.derivation.program(Request {
             first: true,
@@ -106,15 +107,16 @@ impl Oracle {
     }
 }
 
-/// Of difference quotients: h⁸ is below the last digit, and 1/h costs two digits.
+/// The step of difference quotients: the truncation error h⁸ is below the last digit, and the division by h costs two
+/// digits.
 const STEP: f64 = 5e-3;
 
-/// The first derivatives and forces one after the other.
+/// The first derivatives, followed by the forces.
 fn flat(results: &Results) -> Vec<f64> {
     [&results.z[..], &results.q, &results.force].concat()
 }
 
-/// `f64`, `[f64; 3]` or `[f64; N]`.
+/// The type: `f64`, `[f64; 3]` or `[f64; N]`.
 fn field(name: &str, kind: &str) -> Field {
     let length = kind
         .strip_prefix("[f64;")
@@ -152,7 +154,7 @@ impl<const K: usize> Values for [f64; K] {
 
 /// Compares all kernels of a model at a few points.
 fn compare<M: Model<N>, const N: usize>(model: &M, mut oracle: Oracle) {
-    // Numbers in (0.15, 0.85) that follow no pattern: multiples of the golden ratio modulo one.
+    // Numbers in (0.15, 0.85) without a pattern: multiples of the golden ratio modulo one.
     let mut state = 0.5_f64;
     let mut next = || {
         state = (state + 0.618_033_988_749_894_9).fract();
@@ -221,7 +223,8 @@ fn compare<M: Model<N>, const N: usize>(model: &M, mut oracle: Oracle) {
     }
 }
 
-/// Compares the derivatives by parameters and by the time with the interpreter, to the last bit, and with difference quotients.
+/// Compares the derivatives by parameters and by time with the interpreter, to the last bit, and with difference
+/// quotients.
 fn sensitivities<M: Model<N>, const N: usize>(
     model: &M,
     oracle: &mut Oracle,
@@ -258,8 +261,9 @@ fn sensitivities<M: Model<N>, const N: usize>(
         firsts(&first, &expected);
         let (quotient, size) = oracle.difference_quotient(same_by);
         for (derivative, quotient) in flat(&expected).into_iter().zip(quotient) {
-            // Rounding: a value is wrong by some ten units of the last place of its largest term, which may be ten times the largest
-            // result; weights of 2 in all, over the step. Truncation, h⁸ f⁽⁹⁾/630 = 6e-22 f⁽⁹⁾, is below that.
+            // Rounding: values have errors of about ten units in the last place of their largest term, which may be ten
+            // times the largest result; the weights of the quotient sum up to 2, divided by the step. The truncation
+            // error h⁸ f⁽⁹⁾/630 = 6e-22 f⁽⁹⁾ is smaller.
             let tolerance = 20.0 * f64::EPSILON * 10.0 * size.max(1.0) / STEP;
             assert!(
                 (derivative - quotient).abs() <= tolerance,
@@ -269,7 +273,8 @@ fn sensitivities<M: Model<N>, const N: usize>(
     }
 }
 
-/// Compares the kernels of the constraints with the interpreter, to the last bit; the engine's own tests compare that with dual numbers.
+/// Compares the kernels of the constraints with the interpreter, to the last bit. The engine's own tests compare the
+/// interpreter with dual numbers.
 fn constraints<M: Model<N>, const N: usize>(
     model: &M,
     oracle: &Oracle,
@@ -353,14 +358,14 @@ fn vector(name: &str, vector: &[f64], expected: &[f64]) {
     }
 }
 
-/// Finite, so that a comparison says something, and equal.
+/// Asserts that both are equal, and finite, since otherwise the comparison would say nothing.
 #[track_caller]
 fn same(name: &str, compiled: f64, interpreted: f64) {
     assert!(interpreted.is_finite(), "{name}: {interpreted}");
     assert_eq!(compiled, interpreted, "{name}");
 }
 
-/// One model, declared twice from the same tokens.
+/// Declares a model twice from the same tokens.
 macro_rules! agrees {
     (
         $test:ident: [f64; $dof:literal]

@@ -1,10 +1,11 @@
-//! Steps with all points of an element at once give what Newton's method gives for one point after the other.
+//! Steps that evaluate all quadrature points of an element at once give the same results as Newton's method with one
+//! point after the other.
 
 use tfe::prelude::*;
 use tfe::runtime::Form;
 use tfe::runtime::step::{Control, Stepper};
 
-/// Second order, no forces.
+/// Second order, without forces.
 #[dynamics(coordinates(theta), lagrangian = m*l^2/2*dot(theta)^2 + m*g*l*cos(theta))]
 struct Pendulum {
     m: f64,
@@ -12,7 +13,7 @@ struct Pendulum {
     g: f64,
 }
 
-/// Second order, with a force of the velocity and a mass matrix that is not diagonal.
+/// Second order, with a velocity-dependent force and a mass matrix that is not diagonal.
 #[dynamics(
     coordinates(x, y),
     lagrangian = dot(x)^2 + dot(x)*dot(y)/2 + dot(y)^2/2 - cos(x - y) - x^4/4 - y^2,
@@ -23,7 +24,7 @@ struct Coupled {
     c: f64,
 }
 
-/// Second order in phase space, with a force of the momentum.
+/// Second order as a Hamiltonian, with a momentum-dependent force.
 #[dynamics(
     coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2/4)/2 - 1/sqrt(x^2 + y^2),
     force(x) = -c*px, force(y) = -c*py,
@@ -32,14 +33,14 @@ struct Drag {
     c: f64,
 }
 
-/// Constant mass, driven by the time.
+/// A constant mass matrix and a time-dependent force.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + x^2/2 - x^4/4, force(x) = f*cos(t) - c*dot(x))]
 struct Duffing {
     f: f64,
     c: f64,
 }
 
-/// A mass matrix of the coordinates.
+/// A mass matrix that depends on the coordinates.
 #[dynamics(
     coordinates(a, b),
     lagrangian = dot(a)^2 + dot(b)^2/2 + dot(a)*dot(b)*cos(a - b) + g*(2*cos(a) + cos(b)),
@@ -52,7 +53,7 @@ struct Double {
 #[dynamics(coordinates(theta, phi), momenta(p, j), hamiltonian = (p^2 + j^2/sin(theta)^2)/2 + cos(theta))]
 struct Spherical {}
 
-/// Constant mass, with a term that is linear in the velocities and depends on the coordinates.
+/// A constant mass matrix, and a term linear in the velocities with coordinate-dependent factor.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2 + b*(1 + x^2)*(x*dot(y) - y*dot(x)) - (x^4 + y^4)/4,
@@ -61,11 +62,11 @@ struct Charge {
     b: f64,
 }
 
-/// Momenta that are no multiples of velocities although the mass is constant.
+/// Momenta that are not proportional to velocities although the mass is constant.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + 3*dot(x) - cos(x))]
 struct Shifted {}
 
-/// Lagrange's top: two of three coordinates are ignorable, in velocities.
+/// Lagrange's top: two of the three coordinates are cyclic; a Lagrangian.
 #[dynamics(
     coordinates(phi, theta, psi),
     lagrangian = a/2*(dot(theta)^2 + sin(theta)^2*dot(phi)^2) + c/2*(dot(psi) + cos(theta)*dot(phi))^2 - w*cos(theta),
@@ -76,7 +77,8 @@ struct Top {
     w: f64,
 }
 
-/// A cart under a spring: the place of the cart is ignorable, in equations of second order with a mass matrix that is not diagonal.
+/// A cart below a spring: the position of the cart is cyclic; equations of second order with a mass matrix that is not
+/// diagonal.
 #[dynamics(
     coordinates(cart, spring),
     lagrangian = m*dot(cart)^2/2 + dot(cart)*dot(spring) + dot(spring)^2/2 - spring^2/2 - spring^4,
@@ -132,7 +134,7 @@ fn run<M: Model<N>, const N: usize>(
 
 fn elements() -> Vec<Element> {
     let mut elements = Vec::new();
-    // One, two and three groups of four points, full and not.
+    // One, two and three groups of four points, with and without unused lanes.
     for nodes in [2, 3, 5, 6, 9, 12] {
         elements.extend([
             Element::mixed(nodes),
@@ -152,16 +154,16 @@ fn elements() -> Vec<Element> {
 fn compare<M: Model<N>, const N: usize>(model: &M, start: State<N>) {
     for element in elements() {
         let (together, newton) = run(model, element, Solve::Auto, start);
-        // Of a Hamiltonian some elements have no such form, and may need it.
+        // For Hamiltonians, some elements have no such form and need Newton's method.
         let has_form =
             matches!(M::FORM, Form::Lagrangian) || element == Element::mixed(element.nodes());
-        // Two Lobatto points contract badly at such steps.
+        // With two Lobatto points the fixed point converges badly for such steps.
         let contracts = element != Element::primal(2).lobatto();
         assert!(newton == 0 || !has_form || !contracts, "{element}");
         let (one_by_one, _) = run(model, element, Solve::Newton, start);
         let scale = one_by_one.iter().fold(1.0_f64, |s, x| s.max(x.abs()));
         for (x, y) in together.iter().zip(&one_by_one) {
-            // Rounding of thirty steps, and what either iteration leaves.
+            // Rounding errors of thirty steps, and the errors left by either iteration.
             assert!((x - y).abs() < 2e-13 * scale, "{element}: {x} {y}");
         }
     }
@@ -205,7 +207,7 @@ fn phase_space() {
     compare(&Spherical {}, start);
 }
 
-/// Eight trajectories side by side, against one.
+/// Eight trajectories in lanes compared with single ones.
 fn compare_side_by_side<M: Model<N> + Sync, const N: usize>(model: &M, start: State<N>) {
     let starts: Vec<_> = (0..8)
         .map(|lane| {
@@ -232,7 +234,8 @@ fn compare_side_by_side<M: Model<N> + Sync, const N: usize>(model: &M, start: St
     }
 }
 
-/// They are left out of iterations, and must be found at ends, inside, and in matrices.
+/// Cyclic coordinates are left out of the iterations, and must still be right at the ends, inside elements and in
+/// matrices.
 #[test]
 fn ignorable_coordinates() {
     let top = Top {
@@ -265,7 +268,7 @@ fn ignorable_coordinates() {
     compare_side_by_side(&Spherical {}, start);
 }
 
-/// What a run does must not depend on whether somebody looks inside its elements.
+/// The results of a run must not depend on whether the inside of its elements is evaluated.
 #[test]
 fn the_inside_of_elements_costs_no_digit() {
     let double = Double { g: 9.81 };
@@ -281,7 +284,7 @@ fn the_inside_of_elements_costs_no_digit() {
         let _ = watched.dense(t, t + 0.05);
     }
     assert_eq!(seen, unseen);
-    // Afterwards the inside is still to be had.
+    // The inside can still be evaluated afterwards.
     let (one, other) = (watched.dense(4.95, 5.0), alone.dense(4.95, 5.0));
     let (one, other) = (one.at_time(4.97), other.at_time(4.97));
     for a in 0..2 {
@@ -290,10 +293,10 @@ fn the_inside_of_elements_costs_no_digit() {
     }
 }
 
-/// Stiff steps go to Newton's method and come back, with the inside of elements and without.
+/// Stiff steps change to Newton's method and back, with and without the inside of elements.
 #[test]
 fn stiff_steps_are_left_to_newton() {
-    /// A stiff spring that acts only far out.
+    /// A stiff spring that acts only at large distances.
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*exp(8*(x - 1)) - x^2/2)]
     struct Wall {
         k: f64,

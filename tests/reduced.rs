@@ -1,4 +1,5 @@
-//! Models made from models: motions against closed forms, against models declared by hand, and against the original.
+//! Models derived from models (linearised, truncated, reduced): motions compared with closed forms, with models
+//! declared by hand, and with the original.
 
 mod common;
 
@@ -41,7 +42,7 @@ const PENDULUM: Pendulum = Pendulum {
     g: 9.81,
 };
 
-/// The state at the end of a run of nine nodes, which leave rounding only.
+/// The state at the end of a run with nine nodes, whose error is rounding only.
 fn end<M: Model<N>, const N: usize>(model: &M, start: State<N>, span: f64, steps: u32) -> State<N> {
     let step = span / f64::from(steps);
     let simulation = Simulation::new(model).element(Mixed::<9>).step(step);
@@ -86,7 +87,7 @@ fn the_linear_pendulum_is_harmonic() {
     let omega = (PENDULUM.g / PENDULUM.l).sqrt();
     let start = linear.state([0.9], [0.4]);
     let period = 2.0 * std::f64::consts::PI / omega;
-    // A hundred operations a period in each of 16 steps, on numbers of size one.
+    // The error is rounding: a hundred operations in each of 16 steps per period, on numbers of order one.
     let whole = end(&linear, start, period, 16);
     assert!(distance(&whole.q, &[0.9]) < 1e-13, "{:?}", whole.q);
     let third = end(&linear, start, period / 3.0, 8);
@@ -143,7 +144,7 @@ fn a_frozen_spring_is_a_rod() {
     );
 }
 
-/// A heavy symmetric top in Euler angles, its precession φ and spin ψ cyclic.
+/// A heavy symmetric top in Euler angles; precession φ and spin ψ are cyclic.
 #[dynamics(
     coordinates(phi, theta, psi),
     lagrangian = a/2*(dot(theta)^2 + dot(phi)^2*sin(theta)^2) + c/2*(dot(psi) + dot(phi)*cos(theta))^2 - mgl*cos(theta),
@@ -159,7 +160,7 @@ struct Top {
     mgl: f64,
 }
 
-/// The same by its Hamiltonian.
+/// The same as a Hamiltonian.
 #[dynamics(
     coordinates(phi, theta, psi),
     momenta(p_phi, p_theta, p_psi),
@@ -193,12 +194,12 @@ fn a_top_without_its_cyclic_angles_nods_as_the_whole() {
     assert_eq!(whole.states().len(), reduced.states().len());
     let energies = whole.energies().iter().zip(reduced.energies());
     for (whole, reduced) in energies {
-        // The Routhian keeps the energy as a whole.
+        // The Routhian contains the whole energy.
         assert!((whole - reduced).abs() < 1e-12 * whole.abs());
     }
     for (at, (whole, reduced)) in whole.states().iter().zip(reduced.states()).enumerate() {
-        // Momenta of cyclic coordinates are constant in every stage, so both are one and the same method; a hundred steps of a
-        // hundred roundings each, and angles up to sixty.
+        // Momenta of cyclic coordinates are constant in all stages, so that both models give the same method. The
+        // tolerance allows for a hundred steps of a hundred rounding errors each, and angles up to sixty.
         assert!((whole.q[1] - reduced.q[0]).abs() < 1e-12);
         assert!((whole.p[1] - reduced.p[0]).abs() < 1e-12);
         assert!((whole.q[0] - 0.3 - phi[at]).abs() < 1e-11);
@@ -207,7 +208,7 @@ fn a_top_without_its_cyclic_angles_nods_as_the_whole() {
     let spin = |motion: &[f64]| motion.iter().copied().fold(0.0, larger);
     let spin = spin(&reduced.outputs().column("spin").expect("declared"));
     assert!((spin - (6.0 + 0.4 * 0.9_f64.cos())).abs() < 1e-13);
-    // What holds an ignored angle is gone, their velocities have come.
+    // Outputs that contain an eliminated angle are gone, and the velocities of eliminated angles are outputs now.
     assert_eq!(
         Nutation::OBSERVABLES,
         ["height", "spin", "psi_rate", "phi_rate"]
@@ -293,7 +294,7 @@ const RIGID: Rigid = Rigid {
     g: 9.81,
 };
 
-/// The motion from the horizontal over a second.
+/// The motion from the horizontal during one second.
 fn fall<M: Model<2>>(model: &M, start: State<2>, steps: u32) -> Motion<2> {
     let step = 1.0 / f64::from(steps);
     let simulation = Simulation::new(model).element(Mixed::<5>).step(step);
@@ -316,7 +317,7 @@ fn a_rigid_spring_is_a_constraint() {
         assert!(distance(&a.q, &b.q) < 1e-13 && distance(&a.p, &b.p) < 1e-13);
     }
     assert!(one.constraint_residual().position < 1e-13);
-    // The pull shows k, which is gone.
+    // The output `pull` depends on k, which the model no longer has.
     assert_eq!(one.outputs().names()[0].to_string(), "height");
     assert_eq!(one.outputs().names().len(), 1);
 }
@@ -336,7 +337,7 @@ fn an_elastic_rod_tends_to_the_rod() {
     assert!((order - 1.0).abs() < 0.05, "{order} {points:?}");
 }
 
-/// A chain of any length between walls, springs that harden.
+/// A chain of any length between walls, with hardening springs.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - sum(i in 0..n-1, k/2*(q[i+1] - q[i])^2 + a/4*(q[i+1] - q[i])^4)
@@ -351,7 +352,7 @@ struct Chain {
     a: f64,
 }
 
-/// A chain of rods on a line, which may be springs as well.
+/// A chain of rods along a line, which may be springs as well.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m/2*dot(q[i])^2) - k/2*q[0]^2,
@@ -415,7 +416,7 @@ fn rods_of_any_length_become_springs() {
     let start = springs.state(relaxed.clone(), vec![0.0; 6]);
     let simulation = Simulation::new(&springs).element(Mixed::<5>).step(0.1);
     let motion = simulation.run(start, 0.0..3.0).expect("springs");
-    // Nothing pulls: all forces vanish.
+    // In the relaxed state all forces vanish.
     let last = motion.states().last().expect("the end");
     assert!(distance(&last.q, &relaxed) < 1e-13, "{:?}", last.q);
 }
@@ -430,7 +431,8 @@ fn a_length_that_is_a_const_parameter() {
     assert_eq!(<Small<3> as Model<3>>::SENSITIVITIES, ["w[0]"]);
 }
 
-/// 1 − cos q of a billionth is zero: what roundings leave of an energy is no jump of it, neither of a run, nor of an element of Newton's method.
+/// 1 − cos q with q = 1e-9 rounds to zero. Such rounding errors in an energy must not be taken for a jump of it,
+/// neither for a run nor for an element solved by Newton's method.
 #[test]
 fn energies_that_are_roundings_do_not_jump() {
     let model = Pendulums { w: [1.0, 4.0] };

@@ -1,4 +1,4 @@
-//! What runs with an accuracy say about their own error.
+//! How close the estimated error of runs with a given accuracy is to the true one.
 
 #[path = "common/largest.rs"]
 mod largest;
@@ -38,7 +38,7 @@ struct Bounce;
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - 50*x^2, force(x) = sin(3*t)^3)]
 struct Linear;
 
-/// Accuracy asked for, estimate and true error at the end.
+/// The accuracy asked for, the estimate and the true error at the end.
 type Row = (&'static str, f64, f64, f64);
 
 fn rows<'a, M, const N: usize>(
@@ -86,7 +86,8 @@ fn rows<'a, M, const N: usize>(
     }
 }
 
-/// Within a factor of two in nine of ten cases, and never below the truth by more than that.
+/// In nine of ten cases the estimate is within a factor of two of the true error, and it is never smaller than half of
+/// it.
 #[test]
 fn estimates_are_sharp() {
     let mut all = Vec::new();
@@ -157,7 +158,7 @@ fn estimates_are_sharp() {
         (10.0, 0.01),
         &mut all,
     );
-    // Below that the truth is not known well enough.
+    // Below this the reference is not accurate enough.
     all.retain(|(.., error)| *error > 1e-12);
     let ratio = |row: &Row| row.2 / row.3;
     let good = all

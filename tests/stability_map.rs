@@ -1,4 +1,4 @@
-//! Maps of Floquet multipliers against tabulated ones: Mathieu's equation.
+//! Maps of Floquet multipliers compared with tabulated ones: Mathieu's equation.
 
 mod common;
 
@@ -9,14 +9,14 @@ use std::f64::consts::PI;
 use tfe::prelude::*;
 use tfe::stability::{FloquetError, MapError, PointError, StabilityMap, TransitionError};
 
-/// y'' + (a − 2q cos 2t) y = 0
+/// Mathieu's equation y'' + (a − 2q cos 2t) y = 0.
 #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - (a - 2*q*cos(2*t))*y^2/2)]
 struct Mathieu {
     a: f64,
     q: f64,
 }
 
-/// The cases of the table whose names begin so.
+/// The cases of the table whose names have this prefix.
 fn cases(table: &Value, prefix: &str) -> Vec<Value> {
     let cases: Vec<_> = list(&table["cases"])
         .iter()
@@ -27,7 +27,7 @@ fn cases(table: &Value, prefix: &str) -> Vec<Value> {
     cases
 }
 
-/// One cell, whose centre is the point.
+/// A map of a single cell centred at the point.
 fn radius(a: f64, q: f64, element: Element, elements: usize) -> f64 {
     let around = |x: f64| x - 0.5..x + 0.5;
     let map = StabilityMap::over(around(a), around(q))
@@ -37,7 +37,7 @@ fn radius(a: f64, q: f64, element: Element, elements: usize) -> f64 {
     map.value(0, 0).unwrap()
 }
 
-/// tr Φ over the period π.
+/// The trace of the transition matrix Φ over the period π.
 fn trace(a: f64, q: f64, element: Element, elements: usize) -> Result<f64, TransitionError> {
     let model = Mathieu { a, q };
     let rest = model.state([0.0], [0.0]);
@@ -59,7 +59,8 @@ fn multipliers_are_those_of_the_table() {
             .iter()
             .map(|value| number(&value["re"]).hypot(number(&value["im"])))
             .fold(0.0, larger);
-        // Measured 1.5e-11 and 2.1e-14. In the stable case the modulus is one whatever the phase.
+        // The tolerances are twice the measured errors, 1.5e-11 and 2.1e-14. In the stable case the modulus is one,
+        // even if the phase has an error.
         for (element, tolerance) in [(Mixed::<5>.element(), 3e-11), (Mixed::<6>.element(), 5e-14)] {
             let error = (radius(a, q, element, 16) - expected).abs() / expected;
             println!("{element}, a = {a}, q = {q}: {error:.1e}");
@@ -71,7 +72,7 @@ fn multipliers_are_those_of_the_table() {
     }
 }
 
-/// The bisection of f(a) = |tr Φ| − 2 between ends where its sign differs.
+/// The root of f(a) = |tr Φ| − 2 by bisection between ends with different signs.
 fn boundary(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let sign = f(low) > 0.0;
     assert_ne!(sign, f(high) > 0.0, "no boundary from {low} to {high}");
@@ -86,7 +87,8 @@ fn boundary(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// The largest distance of a boundary of stability from a characteristic value, of those below `below_a` that the trace tells at all.
+/// The largest distance of a boundary of stability from a characteristic value below `below_a`, leaving out boundaries
+/// that the trace cannot resolve.
 fn largest_error(element: Element, elements: usize, below_a: f64) -> f64 {
     let table = reference("periodic");
     let (mut largest, mut compared): (f64, usize) = (0.0, 0);
@@ -99,13 +101,14 @@ fn largest_error(element: Element, elements: usize, below_a: f64) -> f64 {
             .map(|(name, value)| (name.clone(), number(value)))
             .collect();
         values.sort_by(|x, y| x.1.total_cmp(&y.1));
-        // The other end of the gap above the last one is not in the table.
+        // The other boundary of the gap above the last one is not in the table.
         for k in 0..values.len() - 1 {
             let (name, value) = &values[k];
-            // Half way to the neighbours the sign of |tr Φ| − 2 has not changed again.
+            // Half way to the neighbouring boundaries: there is no other change of sign in between.
             let below = k.checked_sub(1).map_or(1.0, |k| value - values[k].1);
             let room = 0.5 * below.min(values[k + 1].1 - value).min(1.0);
-            // Across a gap of width w, |tr Φ| − 2 is of size w²: below this, round-off of the trace hides a change of 1e-6 in a.
+            // Across a gap of width w, |tr Φ| − 2 is of the size w². In narrower gaps than this, rounding errors of the
+            // trace exceed the effect of a change of a by 1e-6.
             if room < 1e-4 || *value > below_a {
                 continue;
             }
@@ -122,14 +125,15 @@ fn largest_error(element: Element, elements: usize, below_a: f64) -> f64 {
 
 #[test]
 fn boundaries_are_characteristic_values() {
-    // Order 2n − 2 for n nodes: the worst is the highest one, a₅ = 25.5, where a step of π/16 turns by one radian. Measured 3.5e-6, 1.4e-8 and, with half the step, 1.4e-8.
+    // The order is 2n − 2 for n nodes. The largest error is that of the highest boundary, a₅ = 25.5, where a step of
+    // π/16 turns the oscillator by one radian. Measured: 3.5e-6, 1.4e-8 and, with half the step, 1.4e-8.
     let five = largest_error(Mixed::<5>.element(), 16, 30.0);
     assert!(five < 4e-6, "{five:.1e}");
     let half = largest_error(Mixed::<5>.element(), 32, 30.0);
     assert!((7.5..8.5).contains(&(five / half).log2()), "{half:.1e}");
     let six = largest_error(Mixed::<6>.element(), 16, 30.0);
     assert!(six < 2e-8, "{six:.1e}");
-    // The boundaries below a = 20, of which the usual diagram consists: 8.5e-7.
+    // The boundaries below a = 20, as in the usual diagram: measured 8.5e-7.
     let lower = largest_error(Mixed::<5>.element(), 16, 20.0);
     assert!(lower < 1e-6, "{lower:.1e}");
 }
@@ -146,19 +150,21 @@ fn the_map_knows_the_tongues() {
         let value = |name: &str| number(&case["values"][name]);
         let row = (0..40).find(|j| map.y(*j) > 1.0).unwrap();
         for column in 0..120 {
-            // Along q = 1.025, cells apart from the boundaries at q = 1 by more than these move.
+            // The row is at q = 1.025. Cells further from the boundaries at q = 1 than the boundaries move between both
+            // values are compared.
             let a = map.x(column);
             let boundaries = ["a0", "b1", "a1", "b2", "a2"].map(value);
             if boundaries.iter().any(|boundary| (a - boundary).abs() < 0.1) {
                 continue;
             }
-            // Below the first boundary it is unstable, and changes at each.
+            // Unstable below the first boundary, and with a change at each one.
             let passed = boundaries.iter().filter(|boundary| **boundary < a).count();
             let is_unstable = map.value(column, row).unwrap() > 1.0 + 1e-6;
             assert_eq!(is_unstable, passed % 2 == 0, "a = {a}");
         }
     }
-    // The cells below the limit have modulus one to round-off of the product, √ of it next to a boundary.
+    // In stable cells the modulus is one up to rounding errors of the product, or their square root close to a
+    // boundary.
     let stable = (0..120)
         .filter_map(|i| map.value(i, 0))
         .filter(|value| *value < 1.0 + 1e-6);
@@ -166,7 +172,7 @@ fn the_map_knows_the_tongues() {
     assert!(stable.into_iter().all(|value| (value - 1.0).abs() < 1e-7));
 }
 
-/// Two Mathieu oscillators, apart from each other: the larger multiplier counts.
+/// Two uncoupled Mathieu oscillators: the larger multiplier counts.
 #[dynamics(
     coordinates(x, y),
     lagrangian = dot(x)^2/2 + dot(y)^2/2 - (a - 2*q*cos(2*t))*x^2/2 - b*y^2/2
@@ -179,7 +185,8 @@ struct Two {
 
 #[test]
 fn more_coordinates_have_more_multipliers() {
-    // y'' = y/4 grows by e^{π/2} over π; the others are those of one oscillator. A few hundred ε for a matrix of entries about 5.
+    // y'' = y/4 grows by e^{π/2} over the period π; the other multipliers are those of one oscillator. The tolerance is
+    // a few hundred ε, for a matrix with entries of about 5.
     let plan = StabilityMap::over(0.5..1.5, 0.0..1.0).resolution(3, 3);
     let two = |b: f64| {
         plan.floquet(|a, q| Two { a, b, q }, PI, Mixed::<6>, 16)
@@ -198,7 +205,7 @@ fn more_coordinates_have_more_multipliers() {
     }
 }
 
-/// An oscillator that a force keeps from resting where f ≠ 0.
+/// An oscillator with a force that prevents an equilibrium at the given state for f ≠ 0.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2 + f*x)]
 struct Forced {
     k: f64,
@@ -212,7 +219,7 @@ fn motion_is_not_rest() {
         .floquet(|k, f| Forced { k, f }, 1.0, Mixed::<3>, 4)
         .unwrap();
     assert_eq!(map.failed(), 2);
-    // The middle row has no force: an oscillator, stable.
+    // The middle row has f = 0: a stable oscillator.
     assert!(map.value(0, 1).unwrap() < 1.0 + 1e-12);
     let first = map.first_failure().unwrap();
     assert_eq!((first.column, first.row), (0, 0));
@@ -222,7 +229,7 @@ fn motion_is_not_rest() {
     ));
 }
 
-/// A body that a spring carries, from where it hangs.
+/// A body on a spring, in its position of equilibrium.
 #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*(x - sag)^2 - m*g*x)]
 struct Hanging {
     m: f64,
@@ -234,7 +241,7 @@ struct Hanging {
 #[test]
 fn heavy_bodies_are_at_rest_up_to_roundings_of_their_weight() {
     let (g, k) = (9.81, 7e7);
-    // How many of seven are refused as moving, and how many have failed.
+    // The number of the seven masses that are refused because they move, and the number that fail.
     let refused = |part: f64| {
         let (mut moving, mut failed) = (0, 0);
         for mass in 0..7 {
@@ -260,9 +267,10 @@ fn heavy_bodies_are_at_rest_up_to_roundings_of_their_weight() {
         }
         (moving, failed)
     };
-    // A rounding of the weight, 4e-9 N, gives a momentum of 1e-9 and moves 1e-16. Where that is a rounding of the sag, which turns the force, Newton's method goes to and fro: at 2.35e6 kg.
+    // A rounding error of the weight, 4e-9 N, leads to a momentum of 1e-9 and a displacement of 1e-16. If that is about
+    // one unit in the last place of the sag, Newton's method alternates between two values: at 2.35e6 kg.
     assert_eq!(refused(f64::EPSILON), (0, 0));
-    // A billionth of the sag, some 4e-10, is none.
+    // A displacement of a billionth of the sag, some 4e-10, is not a rounding error and must be refused.
     assert_eq!(refused(1e-9).1, 7);
 }
 
