@@ -1,4 +1,4 @@
-//! Runs with an estimate of their error: what models of both kinds of length have in common.
+//! Runs with error estimates and runs with a prescribed accuracy: the part that both kinds of length share.
 
 mod asked;
 mod graded;
@@ -19,7 +19,7 @@ use std::ops::ControlFlow;
 use tfe_runtime::{Element, Statistics};
 use watcher::{Watcher, follow};
 
-/// A run over a mesh beside one of higher order (T-98).
+/// Integrates over a mesh, and again with an element of higher order; the difference estimates the error (T-98).
 fn estimated<R: Repeatable<N>, const N: usize>(
     run: &R,
     (t0, start): (f64, &R::State),
@@ -38,7 +38,7 @@ fn estimated<R: Repeatable<N>, const N: usize>(
         ControlFlow::Continue(())
     })?;
     let other = || {
-        // The same steps with one node more, or two steps for each of the same number where there are no more.
+        // The same steps with one node more. Above the largest number of nodes: two steps of half the length instead.
         let more = Element::mixed(element.nodes() + 1);
         let start = (t0, start);
         if more.validate().is_ok() {
@@ -46,7 +46,7 @@ fn estimated<R: Repeatable<N>, const N: usize>(
             return follow(run, &mut stepper, start, mesh, &times).map_err(|stop| stop.0);
         }
         let starts = [t0].into_iter().chain(times.iter().copied());
-        // Of all elements, however long the longest is.
+        // Every element is halved, not only the longest ones.
         let halves = starts
             .zip(&times)
             .flat_map(|(t, next)| [t + 0.5 * (next - t), *next]);
@@ -67,10 +67,11 @@ fn estimated<R: Repeatable<N>, const N: usize>(
     }
 }
 
-/// Half a unit of the last place of one: numbers are no nearer to a motion, even where two runs agree to the last bit.
+/// Half a unit in the last place of 1: a lower bound of every relative error, also where two runs agree to the last
+/// bit.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
 
-/// A run with the element and the step that meet an accuracy (T-99).
+/// Searches the element and the step size that meet an accuracy, and runs with them (T-99).
 fn accurate<R: Repeatable<N>, const N: usize>(
     run: &R,
     start: &R::State,
@@ -141,7 +142,7 @@ fn find<R: Repeatable<N>, const N: usize>(
     search(asked, &mut runs, pilot)
 }
 
-/// What is asked of a run is a number between 0 and 1.
+/// Refuses an accuracy that is not between 0 and 1.
 fn check_accuracy(accuracy: f64) -> Result<(), RunErrorKind> {
     if accuracy > 0.0 && accuracy < 1.0 {
         Ok(())

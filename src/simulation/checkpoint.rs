@@ -1,4 +1,4 @@
-//! Runs that go on where others ended.
+//! Continuation of runs from checkpoints.
 
 use super::kind::Simulated;
 use super::mesh::Mesh;
@@ -9,7 +9,8 @@ use crate::motion::{Checkpoint, Motion, Node, Reached};
 use std::ops::Range;
 
 impl Reached {
-    /// The end of a mesh with this origin, behind a last element that had the direction `before`.
+    /// The end of a run over a mesh with this origin; `before` is the direction of the run before, if the mesh is
+    /// empty.
     pub(crate) fn new<const N: usize>(
         (origin, before): (f64, f64),
         step: Option<f64>,
@@ -30,8 +31,9 @@ impl Reached {
         }
     }
 
-    /// The mesh to go on over, how many elements of it are done, and where it begins: the grid of the run if the checkpoint lies on it, else one that begins there. Given nodes
-    /// are those that lie ahead.
+    /// The mesh of the continuation, the number of its elements already done, and its origin. If the checkpoint lies on
+    /// the grid of the run, the grid is continued; otherwise a new one begins at the checkpoint. Of given nodes, those
+    /// ahead are used.
     pub(crate) fn place<const N: usize>(
         &self,
         end: f64,
@@ -53,7 +55,7 @@ impl Reached {
         let on_grid = mesh(&(origin..end), None).ok().filter(|mesh| {
             match mesh.elements().nth(elements) {
                 Some((start, ..)) => start == time,
-                // Nothing is left to do.
+                // The run ends at the checkpoint.
                 None => end == time && mesh.steps() == elements,
             }
         });
@@ -110,7 +112,8 @@ where
             self.check_start(state)?;
             let mut run = self.clone();
             run.step = run.step.or(checkpoint.reached.step);
-            // Before the first element none has acted, and back in time those at the checkpoint are taken away, as all others.
+            // At the checkpoint itself, impulses have acted if the run continues in the same direction. In a first run
+            // none has, and in backward integration all of them are still to be subtracted.
             if (end - time) * direction > 0.0 {
                 M::leave_behind(&mut run.impulses, time);
             }
@@ -122,14 +125,14 @@ where
                 .reached
                 .place(end, self.nodes.as_deref(), |span, nodes| {
                     run.nodes = nodes;
-                    // On a grid that begins anew those before it have acted.
+                    // A new grid begins behind the impulses that lie before it.
                     let mut run = run.clone();
                     let direction = (end - span.start).signum();
                     let is_behind = |time: f64| direction * time < direction * span.start;
                     run.impulses.retain(|one| !is_behind(M::time_of(one)));
                     run.mesh(span)
                 })?;
-            // Before the first element nothing has looked at the start.
+            // A checkpoint without elements was never checked.
             if !is_same || direction == 0.0 {
                 self.check_constraints_at((&place.0, place.1), (time, state))?;
             }
@@ -140,7 +143,7 @@ where
                     M::node(&mut stepper, &*self.model, at, &checkpoint.velocity)
                 }
             };
-            // Another model may see events on other sides.
+            // The signs of the event functions are not those of another model.
             let seen = is_same.then(|| checkpoint.seen.clone());
             let seen = seen.unwrap_or_default();
             Ok((place, seen, stepper, Motion::starting(&*self.model, node)))
@@ -155,13 +158,13 @@ where
         }
     }
 
-    /// The node of a checkpoint. Functions given for inputs may be others than those of the run, so that another velocity belongs to the momentum.
+    /// The node at a checkpoint. Its velocity is computed anew if the functions of the inputs may have changed.
     fn node_of(
         &self,
         checkpoint: &Checkpoint<N, L>,
         stepper: &mut L::Stepper<'_, M>,
     ) -> Node<N, L> {
-        /// Relative to the largest velocity: less is what another iteration leaves.
+        /// The largest relative difference of two velocities that is attributed to the iteration.
         const SAME: f64 = 1e-9;
 
         let (time, state) = (checkpoint.time(), &checkpoint.state);
@@ -179,7 +182,7 @@ where
         Node::of(time, state, known.clone())
     }
 
-    /// Refuses a state that another model had reached, or none, where it is not on the constraints of this one.
+    /// Checks the constraints at the first element of the continuation.
     fn check_constraints_at(
         &self,
         (mesh, done): (&Mesh<N>, usize),

@@ -1,17 +1,18 @@
-//! What a run asks of a start and of a model before it begins.
+//! Checks of the start, the impulses and the model before a run.
 
 use crate::error::RunErrorKind;
 use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::family;
 use tfe_runtime::{Model, State};
 
-/// Whether the energy of a model is known to be conserved, and a jump tells of a step that is too long: linear models have steps of their own kind of error.
+/// Whether energy is conserved by the model, so that a jump of it indicates too long a step. Linear models are
+/// excluded: their steps have another kind of error.
 pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
     let facts = M::FACTS;
     !(facts.time_dependent || facts.forced || facts.linear) && M::CONSTRAINTS.is_empty()
 }
 
-/// The same of a model of run-time length.
+/// The same for a model of run-time length.
 pub(crate) const fn conserves_energies<M: family::Model>() -> bool {
     let facts = M::FACTS;
     !(facts.time_dependent || facts.forced || facts.linear || M::CONSTRAINED)
@@ -22,7 +23,7 @@ pub(crate) fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErr
     check_finite(&state.q, &state.p)
 }
 
-/// The same of models of either kind of length.
+/// The same for vectors of any length.
 pub(super) fn check_finite(q: &[f64], p: &[f64]) -> Result<(), RunErrorKind> {
     for (coordinate, (&q, &p)) in q.iter().zip(p).enumerate() {
         if !(q.is_finite() && p.is_finite()) {
@@ -32,7 +33,7 @@ pub(super) fn check_finite(q: &[f64], p: &[f64]) -> Result<(), RunErrorKind> {
     Ok(())
 }
 
-/// Refuses an impulse that is none, wherever the run goes.
+/// Refuses an impulse with a time or components that are not finite.
 pub(super) fn check_impulse(time: f64, impulse: &[f64]) -> Result<(), RunErrorKind> {
     if time.is_finite() && impulse.iter().all(|one| one.is_finite()) {
         return Ok(());
@@ -40,7 +41,7 @@ pub(super) fn check_impulse(time: f64, impulse: &[f64]) -> Result<(), RunErrorKi
     Err(RunErrorKind::Impulse { time })
 }
 
-/// Refuses a start that is not on the constraints.
+/// Refuses a start that violates the constraints.
 pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
     model: &M,
     time: f64,
@@ -52,7 +53,7 @@ pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
     }
     let v = constrained::velocity_of(model, time, &start.q, &start.p, &[0.0; N]);
     let Ok(v) = v else {
-        // The first element says why.
+        // A singular constraint is reported by the first element.
         return Ok(());
     };
     let residuals = constrained::start_residuals(model, time, &start.q, &v, h);
@@ -64,7 +65,8 @@ pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
     }
 }
 
-/// Refuses derivatives of steps that are cut at kinks: they do not know that the times of the cuts move, which counts where a force jumps.
+/// Refuses derivatives of runs that cut steps at kinks: the derivatives neglect that the times of the cuts move, which
+/// matters where the force jumps.
 pub(super) fn check_kinks<M: Model<N>, const N: usize>(
     at_kinks: Option<bool>,
     call: &'static str,

@@ -1,23 +1,23 @@
-//! Step after step until one fails: what the endless sequences of both kinds of models have in common.
+//! The loop of an endless sequence of steps, for both kinds of length; it ends at the first error.
 
 use super::times::Endless;
 use crate::error::RunErrorKind;
 
-/// A stepper on its way, or the error that it ended with, until that is told.
+/// A stepper with the elements to come, or the error at which it ended, until that has been returned.
 #[derive(Debug)]
 pub(super) struct Course<S> {
     way: Result<(S, Endless), Option<RunErrorKind>>,
     element: usize,
 }
 
-/// An element of a course.
+/// One element of the sequence.
 pub(super) struct Leg {
     pub(super) number: usize,
-    /// Where it begins, to all digits.
+    /// The start, to the full digits of the step; the nodes may be rounded.
     pub(super) begin: f64,
-    /// Its length.
+    /// The length.
     pub(super) h: f64,
-    /// The nodes.
+    /// The times of its two nodes.
     pub(super) nodes: (f64, f64),
 }
 
@@ -34,19 +34,19 @@ impl<S> Course<S> {
         self.way.as_ref().ok().map(|(stepper, _)| stepper)
     }
 
-    /// The same, to be worked with.
+    /// The stepper, mutable.
     pub(super) fn stepper_mut(&mut self) -> Option<&mut S> {
         self.way.as_mut().ok().map(|(stepper, _)| stepper)
     }
 
-    /// When the next element begins, unless the course has ended.
+    /// The start of the next element, unless the sequence has ended.
     pub(super) fn time(&self) -> Option<f64> {
         let (_, elements) = self.way.as_ref().ok()?;
         let (time, ..) = elements.element();
         Some(time)
     }
 
-    /// What `advance` makes of the next element; the stepper goes to `ended` where it fails.
+    /// Calls `advance` on the next element; if that fails, the stepper is passed to `ended`.
     pub(super) fn next<T>(
         &mut self,
         advance: impl FnOnce(&mut S, &Leg) -> Result<T, RunErrorKind>,
@@ -77,12 +77,12 @@ impl<S> Course<S> {
         }
     }
 
-    /// The error that the course ended with, until it has been told.
+    /// Takes the error at which the sequence ended.
     pub(super) fn failure(&mut self) -> Option<RunErrorKind> {
         self.way.as_mut().err()?.take()
     }
 
-    /// Ends without an error.
+    /// Ends the sequence without an error.
     pub(super) fn stop(&mut self, ended: impl FnOnce(&S)) {
         if let Ok((stepper, _)) = &self.way {
             ended(stepper);

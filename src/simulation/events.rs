@@ -1,4 +1,4 @@
-//! Events of runs: where an output changes its sign, and what is done there (T-122).
+//! Events of runs: finds the zero crossings of outputs and functions, and applies the actions there (T-122).
 
 pub(super) mod act;
 mod clear;
@@ -37,24 +37,24 @@ pub struct Watched<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(super) value: Value<'m, L::Vector>,
 }
 
-/// [`Events::look`], or nothing.
+/// [`Events::look`]; does nothing in a run without events.
 type Look<'m, M, const N: usize, L> = fn(
     &mut Events<'m, M, N, L>,
     &Passage<'_, N, L>,
 ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind>;
 
-/// [`Events::keep_off`], or nothing.
+/// [`Events::keep_off`]; does nothing in a run without events.
 type KeepOff<'m, M, const N: usize, L> =
     fn(&mut Events<'m, M, N, L>, &mut <L as Length<N>>::Stepper<'m, M>, (f64, f64)) -> bool;
 
-/// [`Events::meet_due`], or nothing.
+/// [`Events::meet_due`]; does nothing in a run without events.
 type MeetDue<'m, M, const N: usize, L> = fn(
     &mut Events<'m, M, N, L>,
     f64,
     &<L as Length<N>>::State,
 ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind>;
 
-/// Looks for the events of a run.
+/// The search for the events of a run.
 pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     model: Share<'m, M>,
     remodel: Option<Remodel<'m, M>>,
@@ -63,20 +63,20 @@ pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> 
     meet_due: MeetDue<'m, M, N, L>,
     watched: Vec<Watched<'m, N, L>>,
     pub(super) seen: Seen,
-    /// Those that come at the time of the last cut, or have come before it, and are still to be met.
+    /// Events at the time of the last cut, or missed before it, that are still to be met.
     due: VecDeque<Crossed>,
-    /// Of the steps that look for the times of events, as of those of the run.
+    /// The element and the control of the steps that locate events; those of the run.
     chosen: Chosen,
     rooms: Rooms,
     clear: Clear,
-    /// Finds the times of events, apart from the run.
+    /// The stepper that locates events; separate from that of the run.
     probe: Option<L::Stepper<'m, M>>,
     pub(super) met: Vec<Event<N, L>>,
-    /// Events of the element looked into last that did not end it.
+    /// The events in the last element that did not end it.
     recorded: Vec<Place>,
-    /// Cuts in this step.
+    /// The number of cuts in the current step.
     cuts: u32,
-    /// Length of this step.
+    /// The length of the current step.
     step: f64,
 }
 
@@ -87,7 +87,7 @@ impl<M, const N: usize, L: Length<N>> fmt::Debug for Events<'_, M, N, L> {
     }
 }
 
-/// Room for all outputs: numbers, bounds, and bounds with their slopes.
+/// Buffers for all outputs: values, bounds, and bounds with derivatives.
 struct Rooms {
     values: RefCell<Vec<f64>>,
     bounds: RefCell<Vec<Enclosure>>,
@@ -105,10 +105,10 @@ impl Rooms {
     }
 }
 
-/// An element that is to be looked into.
+/// A solved element in which events are looked for.
 pub(super) struct Passage<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) t: f64,
-    /// Where the force is first felt: at `t`, or beyond it by roundings where that is a break.
+    /// The time at which the force is first evaluated: `t`, or a few ulps after it if `t` is a break.
     pub(super) begin: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,
@@ -127,7 +127,7 @@ impl<'a, const N: usize, L: Length<N>> Passage<'a, N, L> {
         }
     }
 
-    /// The time of a place in the element: that of a node where they differ by roundings.
+    /// The time at a distance from the start of the element; that of a node if they differ by rounding only.
     fn time(&self, length: f64, resolution: f64) -> f64 {
         if (self.h - length).abs() <= resolution {
             self.dense.end()
@@ -139,7 +139,7 @@ impl<'a, const N: usize, L: Length<N>> Passage<'a, N, L> {
     }
 }
 
-/// Where an element begins that an event has cut.
+/// The start of an element that an event has cut.
 pub(super) struct Origin<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) t: f64,
     /// As in a [`Passage`].
@@ -148,55 +148,55 @@ pub(super) struct Origin<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) impulses: &'a [Impulse<N>],
 }
 
-/// An event in an element.
+/// The place of an event in an element.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    /// Among those that are looked for.
+    /// The index of the event among those watched.
     watched: usize,
-    /// Among those met.
+    /// The index among the events met so far.
     met: usize,
-    /// The length of the element that ends at it.
+    /// The length of the element that ends at the event.
     length: f64,
-    /// False where it is at the start of the element.
+    /// False for an event at the start of the element.
     inside: bool,
 }
 
-/// An element that ends at an event.
+/// An element that was shortened to end at an event.
 pub(super) struct Cut<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(super) t: f64,
     pub(super) at: L::State,
     pub(super) inside: Option<L::Polynomial>,
-    /// None where the run ends there.
+    /// How the run continues; `None` if it ends here.
     pub(super) after: Option<After<'m, M, N, L>>,
     place: Place,
 }
 
 /// The same beside the element that was to be.
 pub struct Severed<'a, 'm, const N: usize, L: Length<N> = FixedLength> {
-    /// Where the element begins.
+    /// The start of the element.
     pub(super) start: f64,
-    /// Where the force is first felt: at its start, or beyond it by roundings where that is a break.
+    /// The time at which the force is first evaluated: `start`, or a few ulps after it if `start` is a break.
     pub(super) begin: f64,
     pub(super) length: f64,
-    /// What its length was to be.
+    /// The planned length of the element.
     pub(super) step: f64,
     pub(super) before: &'a L::State,
     pub(super) impulses: &'a [Impulse<N>],
-    /// False where the event is at the start.
+    /// False for an event at the start of the element.
     pub(super) inside: bool,
     pub(super) watched: &'a Watched<'m, N, L>,
-    /// The place of what is watched among all.
+    /// The index of the event among those watched.
     pub(super) which: usize,
     pub(super) event: &'a Event<N, L>,
-    /// The place of the event among all.
+    /// The index of the event among those met so far.
     pub(super) number: usize,
     pub(super) goes_on: bool,
 }
 
-/// What has been done at an event that ends an element.
+/// The result of the action at an event that ends an element.
 struct Done<'m, M: 'm, const N: usize, L: Length<N>> {
     place: Place,
-    /// None where the run ends there.
+    /// How the run continues; `None` if it ends here.
     after: Option<After<'m, M, N, L>>,
 }
 
@@ -205,19 +205,21 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// So many events within one step are a motion that comes to rest by ever more of them.
+    /// The largest number of events in one step; with more, events are taken to accumulate (Zeno behaviour).
     const MAX_CUTS: u32 = 1000;
 
-    /// As is one that comes again so soon, relative to the step: a little later its way is lost in roundings.
+    /// Events are also taken to accumulate if one recurs after so short a time, relative to the step; soon after, the
+    /// motion between two events would be lost in rounding error.
     const SOON: f64 = 1e-6;
 
-    /// Goes on with another model.
+    /// Replaces the model.
     pub(super) fn set_model(&mut self, model: Share<'m, M>) {
         (self.model, self.probe) = (model, None);
         self.clear.forget();
     }
 
-    /// What the model is given from outside is another: sides stay those that were seen, and what has jumped over zero is met at once.
+    /// The inputs of the model have changed. The known signs stay, so that a function that jumps over zero by this
+    /// change is met at once.
     pub(super) fn set_inputs(&mut self) {
         self.clear.forget();
     }
@@ -226,13 +228,13 @@ where
         self.watched.is_empty()
     }
 
-    /// A new step of the run.
+    /// Begins a new step of the run.
     pub(super) fn begin(&mut self, step: f64) {
         (self.cuts, self.step) = (0, step);
         self.due.clear();
     }
 
-    /// Whether it is proved, for less than the polynomial of the element takes that was done last, that nothing that is watched vanishes there.
+    /// Whether bounds prove that no watched function vanishes in the last element; cheaper than its polynomial.
     pub(super) fn stays_clear(
         &mut self,
         stepper: &mut L::Stepper<'m, M>,
@@ -270,7 +272,7 @@ where
         )
     }
 
-    /// Does what is to be done at the events inside an element, in their order, up to the first that ends it.
+    /// Applies the actions at the events in an element, in the order of time, up to the first that ends the element.
     pub(super) fn pass(
         &mut self,
         arc: &Passage<'_, N, L>,
@@ -278,12 +280,13 @@ where
         (self.look)(self, arc)
     }
 
-    /// Whether events are to be met at the time of the last cut, before the run goes on.
+    /// Whether events at the time of the last cut are to be met before the run continues.
     pub(super) fn has_due(&self) -> bool {
         !self.due.is_empty()
     }
 
-    /// Does what is to be done at these, in the state that the last one has left, up to the first that acts.
+    /// Applies the actions at these events, from the state that the last action has left, up to the first that ends the
+    /// element.
     pub(super) fn pass_due(
         &mut self,
         time: f64,
@@ -314,7 +317,7 @@ where
                 self.outputs(time, state, &L::zero(q), row);
                 return;
             }
-            // Two elements agree at a node.
+            // The end of one element and the start of the next are the same node.
             let time = if tau == 0.0 { t } else { dense.end() };
             let v = self.model.velocity(time, state, &L::zero(q));
             let v = v.unwrap_or_else(|| L::unknown(q));
@@ -342,7 +345,7 @@ where
                 continue;
             }
             let met = self.located(arc, &root, resolution);
-            // Where the run begins on zero the polynomial may first go the wrong way, by less than its error.
+            // If the run begins on a zero, the polynomial may first move to the wrong side, by less than its error.
             if met.time == arc.t && self.seen.sides[root.function] == 0.0 {
                 remaining.take(root.function);
                 continue;
@@ -375,7 +378,8 @@ where
         Ok(None)
     }
 
-    /// Does what is to be done at an event at the end of an element of a length; nothing has been done where it is only recorded.
+    /// Applies the action at an event at the end of an element of a given length; `None` if the event was only
+    /// recorded.
     fn meet(
         &mut self,
         Crossed { function, rises }: Crossed,
@@ -427,13 +431,15 @@ where
         Ok(Some(Done { place, after }))
     }
 
-    /// Whether this is the event that has cut the element before: the polynomial behind it has another velocity than the node at which it begins.
+    /// Whether this root is the event that has cut the element before, seen again because the polynomial starts with
+    /// another velocity than the node.
     fn is_seen_again(&self, arc: &Passage<'_, N, L>, root: &search::Root, time: f64) -> bool {
         let last = self.last_of(root.into(), time);
         last.is_some_and(|last| last.is_idle || self.begins_behind(arc, root))
     }
 
-    /// Whether it is seen only since the polynomial begins where the function has come from, and goes where the node is already.
+    /// Whether the root exists only because the polynomial starts on the side from which the function came, while the
+    /// node is already on the other side.
     fn begins_behind(&self, arc: &Passage<'_, N, L>, root: &search::Root) -> bool {
         let before = if root.rises { -1.0 } else { 1.0 };
         let value = |state: &L::State, time: f64, v: &L::Vector| {
@@ -452,12 +458,12 @@ where
         begin > 0.0 && middle < begin && value(arc.before, arc.t, &v) < 0.5 * begin
     }
 
-    /// Whether two times are nearer to each other than an event may come again.
+    /// Whether the time between two events is so short that they are taken to accumulate.
     fn is_soon(&self, last: f64, time: f64) -> bool {
         (time - last).abs() < Self::SOON * self.step.abs()
     }
 
-    /// A cut, with all that derivatives need.
+    /// A cut with the data from which its derivatives are computed.
     pub(super) fn severed<'c>(
         &'c self,
         origin: &Origin<'c, N, L>,
@@ -466,7 +472,7 @@ where
         self.place(origin, &cut.place, cut.after.is_some())
     }
 
-    /// The events that did not end the element looked into last.
+    /// The events of the last element that did not end it.
     pub(super) fn gone_by<'c>(
         &'c self,
         origin: Origin<'c, N, L>,
@@ -498,7 +504,7 @@ where
         }
     }
 
-    /// Whether anything that is watched is a function of velocities; those of a Hamiltonian are of momenta.
+    /// Whether a watched function depends on the velocity. Functions of a Hamiltonian depend on the momentum instead.
     fn needs_velocity(&self) -> bool {
         M::NEEDS_VELOCITY || self.has_functions()
     }
@@ -508,7 +514,7 @@ where
         self.watched.iter().any(is_function)
     }
 
-    /// The velocity in an element, where it is needed.
+    /// The velocity inside an element; zero if no watched function needs it.
     fn velocity_inside(&self, dense: &L::Polynomial, time: f64, state: &L::State) -> L::Vector {
         if self.needs_velocity() {
             dense.velocity_at_time(time)
@@ -518,19 +524,19 @@ where
         }
     }
 
-    /// The values of what is watched.
+    /// Writes the values of the watched functions.
     fn outputs(&self, t: f64, state: &L::State, v: &L::Vector, row: &mut Vec<f64>) {
         self.outputs_of(&self.model, (t, state, v), row);
     }
 
-    /// The same, by themselves.
+    /// The values of the watched functions.
     fn row(&self, t: f64, state: &L::State, v: &L::Vector) -> Vec<f64> {
         let mut row = Vec::with_capacity(self.watched.len());
         self.outputs(t, state, v, &mut row);
         row
     }
 
-    /// The same of another model.
+    /// The same for another model.
     fn outputs_of(
         &self,
         model: &M,
@@ -546,7 +552,7 @@ where
         }));
     }
 
-    /// Whether it is proved that nothing that is watched comes to zero in an element. Sides that were not known are known then.
+    /// Whether bounds prove that no watched function vanishes in an element. Signs that were unknown are then known.
     fn stays_off(&mut self, dense: &L::Polynomial) -> bool {
         if self.has_functions() {
             return false;
@@ -568,13 +574,13 @@ where
         true
     }
 
-    /// What is known of an output that is watched in a part of an element.
+    /// What bounds prove about a watched function in a part of an element.
     fn course(&self, dense: &L::Polynomial, function: usize, part: (f64, f64)) -> Course {
         let Value::Column(column) = self.watched[function].value else {
             return Course::Unknown;
         };
         let length = dense.end() - dense.start();
-        // The piece that holds the part, if one holds all of it.
+        // The piece that contains the whole part, if there is one.
         let place = |piece: &L::Polynomial| {
             let from = (piece.start() - dense.start()) / length;
             let to = (piece.end() - dense.start()) / length;

@@ -1,4 +1,4 @@
-//! Who goes along with a run.
+//! Followers: observers that are called along a run.
 
 use super::events::Severed;
 use crate::error::RunErrorKind;
@@ -11,17 +11,17 @@ use tfe_runtime::transition::TransitionError;
 /// An element that a run has passed.
 pub struct Passed<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) start: f64,
-    /// Where it was begun: at its start, or beyond it by roundings where that is a break.
+    /// The time at which the force is first evaluated: the start, or a few ulps after it if the start is a break.
     pub(super) begin: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,
-    /// Where it ends, before impulses there.
+    /// The state at the end, before impulses there.
     pub(super) after: &'a L::State,
 }
 
 /// Is shown what a run does.
 pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
-    /// An element, to its end.
+    /// Called after an element that was passed to its end.
     fn passed(
         &mut self,
         _stepper: &mut L::Stepper<'m, M>,
@@ -30,25 +30,26 @@ pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
         Ok(())
     }
 
-    /// An event inside an element that goes on as if nothing had happened; before the element is passed or cut.
+    /// Called at an event that only records, before its element is passed or cut.
     fn met(&mut self, _severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         Ok(())
     }
 
-    /// An element that an event has cut, up to there.
+    /// Called at an event that cuts an element, with the part up to the event.
     fn cut(&mut self, _severed: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
         Ok(())
     }
 
-    /// After what was done at that event.
+    /// Called after the action at that event.
     fn acted(&mut self) {}
 
-    /// Parameters that were set at that event: the model with them.
+    /// Called with the model whose parameters were set at that event.
     fn set(&mut self, _model: &Share<'m, M>) -> Result<(), RunErrorKind> {
         Ok(())
     }
 
-    /// The end of an element of the grid, in whatever pieces; whether the run goes on.
+    /// Called at the end of an element of the grid, also if events have cut it; the result says whether the run
+    /// continues.
     fn reached(
         &mut self,
         _stepper: &mut L::Stepper<'m, M>,
@@ -58,9 +59,9 @@ pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
         ControlFlow::Continue(())
     }
 
-    /// A node that is recorded.
+    /// Called with each recorded node.
     fn recorded(&mut self, _node: &Node<N, L>) {}
 }
 
-/// Who goes along, if anybody does.
+/// A follower, if there is one.
 pub(super) type Follower<'f, 'm, M, const N: usize, L> = Option<&'f mut dyn Follow<'m, M, N, L>>;

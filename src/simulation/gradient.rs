@@ -1,4 +1,4 @@
-//! Gradients of losses, backwards along a run (T-127).
+//! Gradients of losses by the adjoint method, backward along a run (T-127).
 
 mod family;
 mod view;
@@ -19,7 +19,7 @@ use tfe_runtime::step::Stepper;
 use tfe_runtime::{Direction, Model, Parameter, Pull, State};
 use view::{Unseen, View};
 
-/// A gradient: by the start, ordered (p, q), and by all parameters.
+/// A gradient by the start, in the order (p, q), and by all parameters.
 struct Sums {
     by_start: Vec<f64>,
     by_parameters: Vec<f64>,
@@ -90,13 +90,14 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         let motion = run.drive(start, &span, identity, None)?;
         match run.descended(&motion, &span, loss) {
             Ok(Some((value, sums))) => Ok((value, run.gathered(motion, sums)?)),
-            // A long step that was cut, or not, where it now is not, or is.
+            // A step that was too long was cut in one pass and not in the other.
             Ok(None) => run.record_every(1).forwards(start, span, loss),
             Err(kind) => Err(RunError::new(kind, motion)),
         }
     }
 
-    /// The loss and its gradient, backwards from node to recorded node; `None` where an element does not end where it did.
+    /// The loss and its gradient, by a backward pass between recorded nodes; `None` if a repeated element does not end
+    /// where it did in the run.
     fn descended(
         &self,
         motion: &Motion<N>,
@@ -129,12 +130,12 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         Ok(Some((sum, descent.into_sums())))
     }
 
-    /// All parameters as directions, to be taken at once where that can be.
+    /// The directions of all parameters, grouped into one kernel where possible.
     fn all_parameters(&self) -> Vec<Direction> {
         let indices: Vec<usize> = (0..self.model.parameters()).collect();
         let mut parameters = directions(&*self.model, &indices);
         if M::CONSTRAINTS.is_empty() {
-            // By one kernel, which goes by numbers.
+            // One kernel takes all parameters by their indices.
             for (index, direction) in parameters.iter_mut().enumerate() {
                 direction.parameter = Some(Parameter::Any(index));
             }
@@ -142,7 +143,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         parameters
     }
 
-    /// The same forwards.
+    /// The same by forward sensitivities.
     fn forwards(
         &self,
         start: State<N>,
@@ -163,7 +164,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
     }
 
-    /// What a loss has of nodes and of elements, times their derivatives.
+    /// The gradient as the sum over nodes and elements of the derivatives of the loss times the sensitivities.
     fn summed(&self, sensitive: &Sensitive<N>, seen: &Seen) -> Result<Sums, RunErrorKind> {
         let motion = sensitive.motion();
         let mut view = View::new(&*self.model, seen, &motion.last().v);
@@ -202,11 +203,11 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     }
 }
 
-/// A loss on its way back along the elements of a run.
+/// The state of a backward pass over the elements of a run.
 struct Descent<'a, 'm, M, const N: usize> {
     model: &'a M,
     mesh: &'a Mesh<N>,
-    /// Its elements: nodes and lengths.
+    /// The elements of the mesh: start, end and length.
     elements: &'a [(f64, f64, f64)],
     stepper: Stepper<'m, M, N>,
     parameters: Vec<Direction>,
@@ -249,7 +250,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
         })
     }
 
-    /// The motion between two recorded nodes once more, with all nodes; none where it ends elsewhere.
+    /// Repeats the run between two recorded nodes, with all nodes; `None` if it ends elsewhere.
     fn repeat(
         &mut self,
         before: &Node<N>,
@@ -271,7 +272,8 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
         Ok(is_same.then_some(motion))
     }
 
-    /// Goes back over a motion whose first element has this number; false where an element does not end where it did.
+    /// Passes backward over a motion whose first element has the index `first`; false if an element does not end where
+    /// it did.
     fn pass(
         &mut self,
         motion: &Motion<N>,
@@ -294,7 +296,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
             let pieces = self.stepper.dense(time, next).pieces().len();
             let is_cut_alike = inside.is_empty() || inside.len() == pieces;
             let after = motion.states()[number + 1].state();
-            // Where a tolerance was left derivatives forwards are those of what was computed.
+            // If iterations stop at a tolerance, forward sensitivities are those of what was computed.
             let is_same = is_same::<N, FixedLength>(&state, (&before, &after), 0.0);
             if !(is_same && is_cut_alike) {
                 return Ok(false);
@@ -322,7 +324,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
     }
 }
 
-/// Adds what a loss has directly of a node to λ, ordered (p, q), and to the sums of parameters.
+/// Adds the direct derivatives of the loss at a node to λ, in the order (p, q), and to the sums of parameters.
 fn look<M: Model<N>, const N: usize>(
     view: &View<'_, M, N>,
     pull: &mut Pull<'_, M, N>,
@@ -341,7 +343,7 @@ fn look<M: Model<N>, const N: usize>(
     Ok(())
 }
 
-/// Adds what was seen of parameters directly.
+/// Adds the collected explicit derivatives by parameters.
 fn add_explicit<M: Model<N>, const N: usize>(pull: &Pull<'_, M, N>, by_parameters: &mut [f64]) {
     for (index, sum) in by_parameters.iter_mut().enumerate() {
         *sum += pull.by_parameter(index);

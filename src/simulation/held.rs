@@ -1,4 +1,4 @@
-//! Runs step by step, with inputs that are set between steps.
+//! Runs step by step, with inputs that are set between the steps.
 
 use super::kind::Simulated;
 use super::steps::Steps;
@@ -22,18 +22,18 @@ pub struct Held<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     steps: Steps<'m, Driven<'m, M, L>, N, L>,
     cells: Arc<Cells>,
     node: HeldNode<N, L>,
-    /// An input that cannot be set, to be told by the next step.
+    /// The error of an input that cannot be set; the next step returns it.
     refusal: Option<InputError>,
     samplers: Vec<Sampler<'m, N, L>>,
 }
 
-/// Feedback with a rate of its own.
+/// Sampled feedback with its own period.
 struct Sampler<'m, const N: usize, L: Length<N>> {
-    /// The input.
+    /// The index of the input.
     place: usize,
     start: f64,
     period: f64,
-    /// How often it was called.
+    /// The number of calls so far.
     count: u64,
     law: Law<'m, N, L>,
 }
@@ -89,7 +89,7 @@ where
         cells: Arc<Cells>,
     ) -> Result<Self, RunErrorKind> {
         let Some(node) = steps.node() else {
-            // Not begun, it has an error to tell.
+            // A sequence that could not begin still has its error to return.
             return match steps.next() {
                 Some(Err(kind)) => Err(kind),
                 _ => Err(RunErrorKind::Step { step: f64::NAN }),
@@ -182,9 +182,9 @@ where
         Ok(())
     }
 
-    /// Asks the feedback that is due.
+    /// Calls the sampled feedbacks that are due.
     fn ask_samplers(&mut self) -> Result<(), InputError> {
-        /// In periods, besides those of the times themselves.
+        /// The tolerance of sampling times, in periods, in addition to the resolution of time.
         const ROUNDING: f64 = 1e-9;
         for sampler in &mut self.samplers {
             let Sampler { start, period, .. } = *sampler;

@@ -1,4 +1,4 @@
-//! Second derivatives of losses: differences of gradients, each of which is exact (T-158).
+//! Second derivatives of losses: difference quotients of exact gradients (T-158).
 
 use super::setup::Simulation;
 use crate::differences::{NEARER, PART, WELL_KNOWN, is_next_to_zero, places};
@@ -82,7 +82,7 @@ impl<'m, M: family::Model + Send + Sync + 'm> Simulation<'m, M, 0, RunTimeLength
     }
 }
 
-/// An error of a gradient is one of the call that was made.
+/// Attributes an error of a gradient to the call of the user.
 fn named<const N: usize, L: Length<N>>(error: RunError<N, L>) -> RunError<N, L> {
     error.of_call("gradient", "hessian")
 }
@@ -90,13 +90,14 @@ fn named<const N: usize, L: Length<N>>(error: RunError<N, L>) -> RunError<N, L> 
 /// A loss with its gradient.
 type Found<const N: usize, L> = (f64, LossGradient<N, L>);
 
-/// That of the model itself, and its parameters.
+/// The loss and the gradient at the given parameters, and the parameters.
 struct Own<const N: usize, L: Length<N>> {
     found: Found<N, L>,
     values: Vec<f64>,
 }
 
-/// Derivatives of a gradient by one parameter, and how far two orders are apart, with roundings of the gradient: each and the largest as a part.
+/// The derivatives of a gradient by one parameter; the error estimate of each, which is the difference of two orders
+/// plus the rounding error of the gradient; and the largest relative error.
 struct Column {
     slopes: DVector<f64>,
     errors: DVector<f64>,
@@ -104,7 +105,7 @@ struct Column {
 }
 
 impl Column {
-    /// Entry by entry what is known better.
+    /// Takes each entry with the smaller error estimate.
     fn take_better(&mut self, other: &Self) {
         for (i, error) in other.errors.iter().enumerate() {
             if *error < self.errors[i] {
@@ -114,7 +115,7 @@ impl Column {
     }
 }
 
-/// A part of a scale, or of one where that is none.
+/// The difference step for a scale; for the scale 1 if there is none.
 fn part_of(scale: f64) -> f64 {
     let is_scale = scale.is_finite() && scale > 0.0;
     PART * if is_scale { scale } else { 1.0 }
@@ -164,7 +165,7 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
             }
             if self.is_next_to_zero(*index) {
                 let distance = self.distance_of_loss(*index);
-                // Where the run fails so far away, what there is stays.
+                // If the run fails at this distance, the first estimates stay.
                 if let Ok(other) = self.known_column(&indices, distance, &gradient) {
                     best.take_better(&other);
                 }
@@ -175,7 +176,8 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
         Ok(LossHessian::new(self.found, names, &columns, &errors))
     }
 
-    /// The first distance of differences: a part of the parameter, or of what would change the loss by as much as it is.
+    /// The largest difference step: relative to the parameter, or, if that is zero, to the change that would change the
+    /// loss by its own size.
     fn distance(&self, index: usize) -> f64 {
         match self.values[index] == 0.0 {
             true => self.distance_of_loss(index),
@@ -183,12 +185,12 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
         }
     }
 
-    /// A part of what would change the loss by as much as it is.
+    /// A difference step relative to the change of the parameter that would change the loss by its own size.
     fn distance_of_loss(&self, index: usize) -> f64 {
         part_of((self.found.0 / self.slope(index)).abs())
     }
 
-    /// Whether the loss does not see the size of a parameter.
+    /// Whether the loss does not respond to changes of the size of the parameter.
     fn is_next_to_zero(&self, index: usize) -> bool {
         let value = self.values[index];
         let moved = (value * self.slope(index)).abs();
@@ -199,7 +201,7 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
         self.found.1.by_parameters()[index]
     }
 
-    /// The column over a distance, or a shorter one where that does not tell it.
+    /// The column for a difference step, or for shorter ones if the estimated error is too large.
     fn known_column(
         &self,
         indices: &[usize],
@@ -238,7 +240,8 @@ impl<const N: usize, L: Length<N>> Own<N, L> {
             let roundings = f64::EPSILON * own[indices[i]].abs() / (nearer * distance);
             (eighth[i] - sixth[i]).abs() + roundings
         });
-        // Beside what the parameter changes and what there is: by the first distance, so that nearer ones are not judged more mildly.
+        // Relative to the loss and to its change over the first step, so that shorter steps are not judged less
+        // strictly.
         let part = distance / PART;
         let off = (0..size).map(|i| {
             let sizes = (eighth[i] * part).abs().max(own[indices[i]].abs());

@@ -1,4 +1,4 @@
-//! Impulses on models of run-time length, which act between elements.
+//! Impulses on models of run-time length; they act between elements.
 
 use super::setup::Simulation;
 use crate::length::RunTimeLength;

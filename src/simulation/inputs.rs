@@ -144,7 +144,7 @@ where
         Held::new(run.steps(start, t0), cells)
     }
 
-    /// The same run with inputs, after a change of these.
+    /// The same run with changed inputs.
     fn driven(
         self,
         change: impl FnOnce(

@@ -1,4 +1,4 @@
-//! What runs ask of models of either kind of length.
+//! The interface between runs and the two kinds of length of models.
 
 mod fixed;
 mod run_time;
@@ -22,18 +22,18 @@ use tfe_runtime::{CoordinateName, Element, Facts, Form, Statistics, StepError};
 pub struct Chosen {
     pub(crate) element: Element,
     pub(crate) control: Control,
-    /// Whether steps are cut at kinks.
+    /// Whether steps are cut at kinks of the force.
     pub(crate) at_kinks: bool,
 }
 
 /// A model that can be simulated: implemented for every [`Model`] and every [`family::Model`], and for nothing else.
 /// Its methods are internal.
 pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
-    /// What is known of it.
+    /// The facts about the model known at compile time.
     const FACTS: Facts;
-    /// Whether a search for an accuracy may iterate fixed points.
+    /// Whether a search for an accuracy may solve elements by fixed-point iteration.
     const MAY_ITERATE: bool;
-    /// Whether the energy is kept, and jumps of it tell of steps that are too long.
+    /// Whether energy is conserved, so that jumps of it indicate steps that are too long.
     const CONSERVES: bool;
 
     /// The number of coordinates.
@@ -42,59 +42,59 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// The number of outputs.
     fn output_count(&self) -> usize;
 
-    /// Whether H is linear in the momenta: q̇ = f(q, t) does not hold them, and ṗ = −(∂f/∂q)ᵀ p is its adjoint.
+    /// Whether H is linear in the momenta: q̇ = f(q, t) does not depend on them, and ṗ = −(∂f/∂q)ᵀ p is its adjoint.
     fn is_of_first_order(&self, t: f64, start: &L::State) -> bool;
 
-    /// When an impulse acts.
+    /// The time of an impulse.
     fn time_of(impulse: &L::Impulse) -> f64;
 
-    /// The impulses that may act inside elements.
+    /// The impulses that act inside elements.
     fn inner(impulses: &[L::Impulse]) -> &[Impulse<N>];
 
-    /// Adds the last element of a stepper to a trail, where that is of use.
+    /// Appends the last element of a stepper to a trail, if this kind of model uses trails as first guesses.
     fn leave(stepper: &L::Stepper<'_, Self>, trail: &mut Trail);
 
-    /// Has an element of a stepper, its start and length, start from what a trail says.
+    /// Takes the first guess for the next element, given by its start and length, from a trail.
     fn foresee(stepper: &mut L::Stepper<'_, Self>, trail: &Trail, step: (f64, f64));
 
-    /// Changes what iterations may leave from the next step on.
+    /// Sets the tolerance of the iterations from the next step on.
     fn set_tolerance(stepper: &mut L::Stepper<'_, Self>, tolerance: f64);
 
-    /// What the steps have cost since the last call.
+    /// The work of the steps since the last call.
     fn take_statistics(stepper: &mut L::Stepper<'_, Self>) -> Statistics;
 
-    /// Refuses a start, or impulses, that the model cannot have; by their lengths first, before memory is asked for.
+    /// Refuses a start or impulses that do not fit the model. Lengths are checked first, before memory is allocated.
     ///
     /// # Errors
     /// What is wrong with them.
     fn check_start(&self, start: &L::State, impulses: &[L::Impulse]) -> Result<(), RunErrorKind>;
 
-    /// Refuses a start that is not on the constraints, for a first element of a length.
+    /// Refuses a start that violates the constraints, for a first element given by start and length.
     ///
     /// # Errors
-    /// By how much it is off.
+    /// The violation.
     fn check_first(&self, element: (f64, f64), start: &L::State) -> Result<(), RunErrorKind>;
 
-    /// The elements of a span.
+    /// Divides a span into elements.
     ///
     /// # Errors
-    /// What is wrong with what was asked for.
+    /// What is wrong with the span, the step or the nodes.
     fn mesh(span: &Range<f64>, grid: &Grid<'_, L::Impulse>) -> Result<Mesh<N>, RunErrorKind>;
 
-    /// Of a run that goes on, those impulses at its beginning that have acted already.
+    /// Removes the impulses at the beginning of a continued run, which have acted already.
     fn leave_behind(impulses: &mut Vec<L::Impulse>, t: f64);
 
-    /// The only node of a motion; of the model nothing is asked where there is no stepper and it may not fit together.
+    /// The only node of a motion. Without a stepper the model is not evaluated, since its lengths may be inconsistent.
     fn first_node(
         &self,
         at: (f64, &L::State),
         stepper: Option<&mut L::Stepper<'_, Self>>,
     ) -> Motion<N, L>;
 
-    /// A stepper at rest.
+    /// Creates a stepper without first guesses.
     ///
     /// # Errors
-    /// Where the model cannot be stepped with the element.
+    /// If the model cannot be solved with the element.
     fn stepper<'m>(
         model: Share<'m, Self>,
         chosen: Chosen,
@@ -102,7 +102,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     where
         Self: 'm;
 
-    /// A stepper that goes on from where one was suspended; at rest where that had another element.
+    /// Resumes a suspended stepper, or creates a new one if that had another element.
     ///
     /// # Errors
     /// As [`stepper`](Self::stepper).
@@ -114,18 +114,18 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     where
         Self: 'm;
 
-    /// Leaves the model.
+    /// Separates a stepper from its model.
     fn suspended(stepper: L::Stepper<'_, Self>) -> L::Suspended;
 
-    /// Whether a stepper that was suspended had this model, as far as can be told.
+    /// Whether a suspended stepper belonged to this model, as far as that can be determined.
     fn is_that_of(&self, suspended: &L::Suspended) -> bool;
 
-    /// A stepper whose elements are not looked into.
+    /// A stepper that does not prepare polynomials inside elements.
     fn ends_only<'m>(stepper: L::Stepper<'m, Self>) -> L::Stepper<'m, Self>
     where
         Self: 'm;
 
-    /// Refuses a start to which no velocity belongs, where a run needs one.
+    /// Refuses a start for which no velocity can be computed, if the run needs one.
     ///
     /// # Errors
     /// Why there is none.
@@ -137,7 +137,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// The element and how it is solved.
     fn chosen(stepper: &L::Stepper<'_, Self>) -> (Element, Control);
 
-    /// Goes on with other parameters.
+    /// Replaces the model by one with other parameters.
     ///
     /// # Errors
     /// As [`stepper`](Self::stepper).
@@ -148,10 +148,10 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     where
         Self: 'm;
 
-    /// Moves a state over an element.
+    /// Advances a state over an element.
     ///
     /// # Errors
-    /// The state is as it was then.
+    /// Why the element could not be solved; the state is then unchanged.
     fn advance(
         stepper: &mut L::Stepper<'_, Self>,
         element: (f64, f64),
@@ -159,23 +159,24 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError>;
 
-    /// Appends bounds of coordinates, then of velocities (momenta of a Hamiltonian), all along the last element; false where they are not to be had for less than its polynomial.
+    /// Appends bounds of the coordinates, then of the velocities (momenta of a Hamiltonian), over the last element;
+    /// false if these would cost as much as its polynomial.
     fn reach(stepper: &mut L::Stepper<'_, Self>, bounds: &mut Vec<(f64, f64)>) -> bool;
 
-    /// Whether coordinates and velocities stay within such bounds all along the last element, as far as these tell.
+    /// Whether such bounds contain coordinates and velocities over the last element; false if this is not proved.
     fn reaches_within(stepper: &mut L::Stepper<'_, Self>, bounds: &[(f64, f64)]) -> bool;
 
-    /// Bounds of all outputs over a box of times, coordinates and velocities (momenta); false where there are none.
+    /// Bounds of all outputs over a box of time, coordinates and velocities (momenta); false if there are none.
     fn outputs_within(&self, bounds: &[Enclosure], values: &mut [Enclosure]) -> bool;
 
-    /// The polynomial of the last element, in memory that is not needed any more.
+    /// The polynomial of the last element; it reuses the memory of one that is no longer needed.
     fn inside(
         stepper: &mut L::Stepper<'_, Self>,
         spare: Option<L::Polynomial>,
         nodes: (f64, f64),
     ) -> L::Polynomial;
 
-    /// A state with its velocities, looked for from a guess on.
+    /// The node of a state; its velocity is found by iteration from a guess.
     fn node(
         stepper: &mut L::Stepper<'_, Self>,
         model: &Self,
@@ -191,7 +192,7 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
         at: (f64, &L::State),
     );
 
-    /// What the energy of a node may be rounded by; models that do not conserve it are not asked.
+    /// The rounding error of the energy of a node; zero for models that do not conserve energy.
     fn rounding_at(&self, node: &Node<N, L>) -> f64 {
         match const { Self::CONSERVES } {
             true => self.energy_rounding(node.t, (&node.q, &node.p), &node.v),
@@ -199,28 +200,28 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
         }
     }
 
-    /// The velocity that constraints leave of a momentum, looked for from a guess on.
+    /// The velocity that belongs to a momentum under the constraints, by iteration from a guess.
     fn allowed_velocity(&self, t: f64, state: &L::State, guess: &L::Vector) -> Option<L::Vector>;
 
-    /// What the steps so far have cost.
+    /// The work of the steps so far.
     fn statistics<'s>(stepper: &'s L::Stepper<'_, Self>) -> &'s Statistics;
 
     /// The impulses that act inside an element.
     fn acting(impulses: &[L::Impulse], nodes: (f64, f64)) -> Vec<Impulse<N>>;
 
-    /// Lets impulses act that do so between elements; whether there are any.
+    /// Applies the impulses between elements; returns whether there are any.
     fn kick(&self, impulses: &[L::Impulse], at: (f64, f64), state: &mut L::State) -> bool;
 
-    /// Lets the first ones of impulses act that may do so inside elements, as far as they act at a time; how many do.
+    /// Applies those of the impulses inside elements, from the first on, that act at a time; returns their number.
     fn kick_at(&self, impulses: &[Impulse<N>], at: (f64, f64), state: &mut L::State) -> usize;
 
-    /// Refuses a state from which a run cannot go on.
+    /// Refuses a state from which a run cannot continue.
     ///
     /// # Errors
     /// What is wrong with it.
     fn check_restart(&self, t: f64, h: f64, state: &L::State) -> Result<(), RunErrorKind>;
 
-    /// Looks at an element before it is passed, or after it has failed.
+    /// Checks an element before it is passed, or after it has failed.
     fn look(
         &self,
         watch: &mut Watch,
@@ -230,13 +231,13 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
         failed: bool,
     );
 
-    /// What is wrong with the mass matrix at the start of a run.
+    /// The warning about the mass matrix at the start of a run, if there is one.
     fn weigh(&self, start: &Node<N, L>) -> Option<Warning>;
 
-    /// What bounds of all that outputs are functions of, along a piece of an element, leave for the outputs.
+    /// Bounds of the outputs over a piece of an element, from the bounds of all their arguments.
     fn outputs_along(&self, piece: &L::Polynomial, values: &mut [Enclosure]);
 
-    /// The same over a part of it, from fraction to fraction of its length, with derivatives by that fraction.
+    /// The same over the part between two fractions of its length, with derivatives by this fraction.
     fn outputs_over(&self, piece: &L::Polynomial, part: (f64, f64), values: &mut [Dual<Enclosure>]);
 
     /// The outputs and their derivatives in a direction (δt, δq, δz), z the velocities, or the momenta of a Hamiltonian.
@@ -248,10 +249,10 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
         values: &mut [Dual<f64>],
     );
 
-    /// The momenta of velocities; NaN where there are none.
+    /// The momenta of given velocities; NaN if there are none.
     fn momenta(&self, t: f64, q: &L::Vector, v: &L::Vector) -> L::Vector;
 
-    /// ∂p/∂(parameter), where the velocity stays.
+    /// ∂p/∂(parameter) at fixed velocity.
     fn momenta_by(
         &self,
         t: f64,
@@ -263,20 +264,20 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// The names of the parameters that can be set.
     fn parameter_names(&self) -> Vec<CoordinateName>;
 
-    /// The same model with another value of a parameter, if one can be made.
+    /// The same model with another value of a parameter, if its parameters can be set.
     fn with_value(&self, number: usize, value: f64) -> Option<Self>;
 
     /// The value of a parameter.
     fn parameter_value(&self, number: usize) -> f64;
 
-    /// What `f` gives, in which the model is evaluated; nothing where a function given for an input has panicked.
+    /// Calls `f`, which evaluates the model; `None` if a user function for an input has panicked.
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Option<T>;
 
-    /// What the failure of an element is told as: for a function of an input that is not finite within it, if there is one.
+    /// The error of an element that failed; it names a function for an input if that is not finite in the element.
     fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind;
 }
 
-/// Outputs are functions of velocities, or of momenta.
+/// The second argument of outputs: velocities, or momenta for a Hamiltonian.
 fn second<V>(form: Form, v: V, p: V) -> V {
     match form {
         Form::Lagrangian => v,

@@ -1,4 +1,4 @@
-//! Runs with the transition matrix of every element.
+//! Runs with the transition matrices of all elements.
 
 pub(in crate::simulation) mod family;
 
@@ -76,15 +76,15 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     }
 }
 
-/// The matrices of the elements passed so far.
+/// Collects the transition matrices along a run.
 struct Matrices<'m, M, const N: usize> {
-    /// Since the last of them.
+    /// The derivatives since the end of the last matrix.
     tangents: Tangents<'m, M, N>,
-    /// Whether there has been an event since.
+    /// Whether an event has occurred since then.
     is_across: bool,
     entries: Vec<f64>,
     transitions: Vec<DMatrix<f64>>,
-    /// Where every matrix starts, the motions that constraints allow, for models that have any.
+    /// Bases of the motions that the constraints allow, at the start of each matrix; for models with constraints.
     bases: Vec<Result<DMatrix<f64>, StepError>>,
 }
 
@@ -95,7 +95,7 @@ impl<M: Model<N>, const N: usize> Matrices<'_, M, N> {
         }
     }
 
-    /// Ends a matrix that goes across events.
+    /// Ends a matrix that spans events.
     fn close(&mut self) {
         if self.is_across {
             self.transitions.push(self.tangents.restart());

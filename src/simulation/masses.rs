@@ -1,4 +1,4 @@
-//! What is wrong with the mass matrix at the start of a run.
+//! Checks at the start of a run whether the mass matrix is indefinite.
 
 use crate::length::RunTimeLength;
 use crate::motion::{Node, Warning};
@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use tfe_runtime::family::{self, Block, Entries};
 use tfe_runtime::{First, Form, Model};
 
-/// The mass matrix of a Lagrangian of fixed size.
+/// The range of eigenvalues of an indefinite mass matrix, for a Lagrangian of fixed size.
 pub(super) fn mass_signs<M: Model<N>, const N: usize>(
     model: &M,
     start: &Node<N>,
@@ -21,7 +21,7 @@ pub(super) fn mass_signs<M: Model<N>, const N: usize>(
     told(start.t, signs(mass.as_flattened()))
 }
 
-/// That of a Lagrangian of run-time length.
+/// The same for a Lagrangian of run-time length.
 pub(super) fn mass_signs_by_entries<M: family::Model>(
     model: &M,
     start: &Node<0, RunTimeLength>,
@@ -44,7 +44,7 @@ fn told(time: f64, signs: Option<(f64, f64)>) -> Option<Warning> {
     })
 }
 
-/// A symmetric matrix: its diagonal, and contributions to the entries above it, in the order in which they come.
+/// A symmetric matrix as its diagonal and a list of contributions to the entries above it, in any order.
 struct Masses {
     diagonal: Vec<f64>,
     above: Vec<(usize, usize, f64)>,
@@ -68,9 +68,10 @@ impl Masses {
         }
     }
 
-    /// As [`signs`]. Of a large matrix that is not diagonal only the diagonal is looked at, and every two coordinates that are coupled: each has eigenvalues between those of the whole.
+    /// As [`signs`]. For a large matrix that is not diagonal, only the diagonal and the 2×2 minors of coupled
+    /// coordinates are examined; their eigenvalues lie between those of the matrix.
     fn signs(mut self) -> Option<(f64, f64)> {
-        /// The largest matrix whose eigenvalues are computed: they take a millisecond.
+        /// The largest matrix whose eigenvalues are computed, which takes about a millisecond.
         const MAX_DENSE: usize = 64;
 
         let size = self.diagonal.len();
@@ -103,16 +104,16 @@ impl Masses {
     }
 }
 
-/// Eigenvalues below this part of the largest are roundings of the entries.
+/// Eigenvalues below this fraction of the largest are taken for rounding errors of the entries.
 const LEAST_PART: f64 = 1e-14;
 
-/// Whether two numbers are of different signs, the lesser one in size more than a part of the other.
+/// Whether two numbers have different signs, and the smaller one is not negligible relative to the larger one.
 fn are_of_both((least, largest): (f64, f64), part: f64) -> bool {
     let size = least.abs().max(largest.abs());
     least < -part * size && largest > part * size
 }
 
-/// The least and the largest of some numbers, if they are of different signs.
+/// The least and the largest number, if they have different signs.
 fn signs_of_diagonal(masses: &[f64]) -> Option<(f64, f64)> {
     let masses = || masses.iter().copied();
     let least = masses().fold(f64::INFINITY, f64::min);
@@ -121,9 +122,9 @@ fn signs_of_diagonal(masses: &[f64]) -> Option<(f64, f64)> {
     are_of_both(ends, LEAST_PART).then_some(ends)
 }
 
-/// The least and the largest eigenvalue of a symmetric matrix, if they are of different signs beyond roundings.
+/// The least and the largest eigenvalue of a symmetric matrix, if they have different signs beyond rounding error.
 fn signs(matrix: &[f64]) -> Option<(f64, f64)> {
-    /// Beside the largest, with the unit of each coordinate such that the diagonal is one.
+    /// The rounding error of eigenvalues relative to the largest, after scaling to a unit diagonal.
     const ROUNDING: f64 = 1e-9;
 
     if !matrix.iter().all(|entry| entry.is_finite()) {
@@ -136,7 +137,8 @@ fn signs(matrix: &[f64]) -> Option<(f64, f64)> {
         return signs_of_diagonal(&diagonal);
     }
     let matrix = DMatrix::from_row_slice(size, size, matrix);
-    // Signs of eigenvalues do not depend on units (Sylvester), but roundings do: a light body beside a heavy one has its own.
+    // By Sylvester's law the signs do not depend on the units of coordinates, but rounding errors do: scaled, a light
+    // body beside a heavy one has its own.
     let unit = |a: usize| {
         let row = matrix.column(a);
         let sizes = [row[a].abs(), largest(row.as_slice())];
@@ -157,7 +159,8 @@ fn signs(matrix: &[f64]) -> Option<(f64, f64)> {
     if are_of_both(ends, ROUNDING) {
         return Some(ends);
     }
-    // The lesser one in size is lost in roundings of the other: x·Mx/x·x for an x that gives its sign.
+    // The smaller eigenvalue is lost in the rounding error of the larger one. The Rayleigh quotient x·Mx/x·x of the
+    // scaled eigenvector x shows its sign instead.
     let eigen = scaled.symmetric_eigen();
     let quotient = |place: usize| {
         let parts = eigen.eigenvectors.column(place);
@@ -182,7 +185,7 @@ mod tests {
             (None, None) => {}
             (Some(found), Some(expected)) => {
                 for (found, expected) in [(found.0, expected.0), (found.1, expected.1)] {
-                    // A few roundings of each.
+                    // A few ulps of each.
                     let off = (found - expected).abs();
                     assert!(off <= 1e-13 * expected.abs(), "{found} {expected}");
                 }
@@ -196,7 +199,7 @@ mod tests {
         check(signs(&[1e12, 0.0, 0.0, -1.0]), Some((-1.0, 1e12)));
         check(signs(&[1.0, 0.0, 0.0, -1e-12]), Some((-1e-12, 1.0)));
         check(signs(&[-1e12, 0.0, 0.0, 1.0]), Some((-1e12, 1.0)));
-        // What cancels leaves either sign.
+        // Rounding errors of cancelled entries have either sign.
         check(signs(&[1.0, 0.0, 0.0, -1e-17]), None);
         check(signs(&[1.0, 1.0, 1.0, 1.0 - 1e-12]), None);
         check(signs(&[1e12, 0.5e6, 0.5e6, 1.0]), None);
@@ -204,9 +207,10 @@ mod tests {
         check(signs(&[0.0; 4]), None);
         let found = signs(&[1e12, 1e3, 1e3, -1.0]);
         let (least, largest) = found.expect("a light body of the wrong sign");
-        // −1 − 1e6/1e12, and a quotient that is as near.
+        // The eigenvalue is −1 − 1e6/1e12; the Rayleigh quotient is as close.
         assert!((least + 1.0).abs() < 1e-5 && (largest - 1e12).abs() < 1.0);
-        // Two coordinates whose coupling is larger than the root of the product of their masses: some quotient of either sign.
+        // The coupling of two coordinates exceeds the geometric mean of their masses, so that the quotient takes both
+        // signs.
         let found = signs(&[1e12, 2e6, 2e6, 1.0]);
         let (least, largest) = found.expect("a determinant of −3e12");
         assert!((-3.0 - 1e-9..-0.1).contains(&least) && largest > 1e11);
@@ -217,7 +221,7 @@ mod tests {
         let of = |masses: &[f64], above: &[(usize, usize, f64)]| {
             let mut found = Masses::none(masses.len());
             for (a, mass) in masses.iter().enumerate() {
-                // In parts, as kernels do.
+                // In several contributions, as kernels write them.
                 found.add(Block::ZZ, a, a, 0.25 * mass);
                 found.add(Block::ZZ, a, a, 0.75 * mass);
             }
@@ -234,7 +238,7 @@ mod tests {
             check(of(&ones, &[]), None);
             check(of(&mixed, &[]), Some((-2.0, 1.0)));
             check(of(&vec![-1.0; size], &[]), None);
-            // Eigenvalues 1 ∓ 1.5; the rest are ones.
+            // The eigenvalues are 1 ∓ 1.5 and ones.
             let coupled = [(0, 1, 0.5), (0, 1, 1.0)];
             check(of(&ones, &coupled), Some((-0.5, 2.5)));
             check(of(&ones, &[(0, 1, 0.5), (0, 1, 0.25)]), None);

@@ -1,4 +1,4 @@
-//! The elements of a run, and the impulses that act in them.
+//! The mesh of a run: its elements and the impulses that act in them.
 
 use super::times::{Elements, Times, check_span, ends};
 use crate::error::RunErrorKind;
@@ -15,7 +15,7 @@ pub struct Grid<'a, I> {
 }
 
 impl<I> Grid<'_, I> {
-    /// The elements of a span, with impulses that act inside them.
+    /// The mesh of a span, with the impulses that act inside it.
     pub(crate) fn mesh<const N: usize>(
         &self,
         span: &Range<f64>,
@@ -33,14 +33,14 @@ impl<I> Grid<'_, I> {
 #[derive(Clone, Debug)]
 pub struct Mesh<const N: usize> {
     times: Times,
-    /// In the order in which the run meets them.
+    /// In the order in which the run passes them.
     impulses: Vec<Impulse<N>>,
-    /// The length of its steps, where it is made of equal ones.
+    /// The step size, if the steps are equal.
     step: Option<f64>,
 }
 
 impl<const N: usize> Mesh<N> {
-    /// Cuts `span` into steps of size `|step|` that end at every break inside it.
+    /// Divides `span` into steps of size `|step|` that end at every break inside it.
     pub(crate) fn new(
         span: &Range<f64>,
         step: f64,
@@ -55,7 +55,7 @@ impl<const N: usize> Mesh<N> {
         })
     }
 
-    /// The elements between nodes; of impulses those that act there.
+    /// The elements between given times, with the impulses that act in them.
     pub(crate) fn of_nodes(
         nodes: &[f64],
         breaks: &[f64],
@@ -66,7 +66,8 @@ impl<const N: usize> Mesh<N> {
         Self::through(&(start..end), nodes, breaks, &impulses)
     }
 
-    /// The parts between `cuts`, in the order of the run, each in equal steps of at most `step`; of impulses those that act there. Some of the cuts may be `breaks`.
+    /// Divides each part between `cuts`, in the order of the run, into equal steps of at most `step`. Some of the cuts
+    /// may be `breaks`. Only impulses inside the cuts are kept.
     pub(crate) fn even(
         cuts: &[f64],
         step: f64,
@@ -83,7 +84,7 @@ impl<const N: usize> Mesh<N> {
         })
     }
 
-    /// The elements between given nodes, which begin and end with the span, cut at every break besides.
+    /// The elements between given nodes, which begin and end with the span; breaks are added to the nodes.
     pub(crate) fn through(
         span: &Range<f64>,
         nodes: &[f64],
@@ -98,12 +99,12 @@ impl<const N: usize> Mesh<N> {
         })
     }
 
-    /// The length of its steps, where it is made of equal ones; elements that end at breaks may be shorter.
+    /// The step size, if the steps are equal; elements that end at breaks may be shorter.
     pub(crate) fn step(&self) -> Option<f64> {
         self.step
     }
 
-    /// One, or minus one where the run goes back in time.
+    /// 1, or −1 in backward integration.
     pub(crate) fn direction(&self) -> f64 {
         self.times.direction
     }
@@ -113,17 +114,17 @@ impl<const N: usize> Mesh<N> {
         self.times.end()
     }
 
-    /// How many elements there are.
+    /// The number of elements.
     pub(crate) fn steps(&self) -> usize {
         self.times.elements().len()
     }
 
-    /// Start, end and length of each element, see [`Times::elements`].
+    /// Start, end and length of each element; see [`Times::elements`].
     pub(crate) fn elements(&self) -> Elements<'_> {
         self.times.elements()
     }
 
-    /// Where the force is first felt in an element, see [`Times::begin`].
+    /// The time at which the force is first evaluated in an element; see [`Times::begin`].
     pub(crate) fn begin(&self, t: f64, h: f64) -> f64 {
         if self.times.has_breaks {
             self.times.begin(t, h)
@@ -132,7 +133,8 @@ impl<const N: usize> Mesh<N> {
         }
     }
 
-    /// The impulses that act in the element from `t` to `next`: one at a node belongs to the element that it starts, at the end of the span to the last.
+    /// The impulses that act in the element from `t` to `next`. An impulse at a node belongs to the element that starts
+    /// there; at the end of the span, to the last element.
     pub(crate) fn impulses_in(&self, t: f64, next: f64, last: bool) -> &[Impulse<N>] {
         if self.impulses.is_empty() {
             return &[];
@@ -151,7 +153,7 @@ impl<const N: usize> Mesh<N> {
     }
 }
 
-/// Impulses in the order in which a run meets them.
+/// The impulses in the order in which a run passes them.
 fn in_order<const N: usize>(
     impulses: &[Impulse<N>],
     span: &Range<f64>,
@@ -175,7 +177,7 @@ fn in_order<const N: usize>(
     Ok(ordered)
 }
 
-/// The impulses between two times.
+/// The impulses between two times, inclusive.
 fn acting<const N: usize>(start: f64, end: f64, impulses: &[Impulse<N>]) -> Vec<Impulse<N>> {
     let inside =
         |impulse: &&Impulse<N>| start.min(end) <= impulse.time && impulse.time <= start.max(end);
@@ -191,7 +193,7 @@ pub(crate) fn within(time: f64, t: f64, next: f64) -> bool {
     }
 }
 
-/// The places of times in the order in which a run meets them; of equal ones the first comes first.
+/// The indices of times in the order in which a run passes them; the order of equal times is kept.
 fn order(times: &[f64], direction: f64) -> Vec<usize> {
     let mut places: Vec<usize> = (0..times.len()).collect();
     places.sort_by(|&a, &b| (direction * times[a]).total_cmp(&(direction * times[b])));
@@ -231,7 +233,7 @@ mod tests {
         assert_eq!((many.len(), many[1000]), (1001, 10.0));
     }
 
-    /// A rounding of the times is no step: 9 steps end a rounding behind 1e9 + 0.009, where a tenth one would have no length.
+    /// 9 steps end one ulp before 1e9 + 0.009; a tenth step would have no length.
     #[test]
     fn roundings_of_the_times_are_no_steps() {
         for (start, step) in [(1e9, 1e-3), (-1e9, 1e-3), (1.7e9, 0.01)] {

@@ -1,4 +1,4 @@
-//! One element of the grid of a run, in the pieces into which events cut it.
+//! Passes one element of the grid of a run; events may cut it into pieces.
 
 use super::acting;
 use super::events::act::After;
@@ -12,20 +12,20 @@ use std::ops::ControlFlow;
 use tfe_runtime::Share;
 use tfe_runtime::step::Impulse;
 
-/// An element of the grid.
+/// An element of the grid that is to be solved.
 #[derive(Clone, Copy)]
 pub(super) struct Planned<'a, const N: usize> {
     pub(super) number: usize,
-    /// The nodes.
+    /// The times of its nodes.
     pub(super) t: f64,
     pub(super) next: f64,
     pub(super) h: f64,
-    /// Where it begins, to all digits.
+    /// The start, to the full digits of the step.
     pub(super) begin: f64,
     pub(super) impulses: &'a [Impulse<N>],
 }
 
-/// A piece that has been passed without an event that cuts it.
+/// A piece that was solved and not cut by an event.
 pub(super) struct Piece<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) start: f64,
     pub(super) h: f64,
@@ -41,20 +41,20 @@ pub(super) enum Side {
     After,
 }
 
-/// Is shown what becomes of an element.
+/// An observer of what happens in an element.
 pub(super) trait Observe<'m, M: 'm, const N: usize, L: Length<N> = FixedLength>:
     Follow<'m, M, N, L>
 {
-    /// Whether the polynomial of every piece is wanted.
+    /// Whether the observer takes the polynomial of every piece.
     fn keeps(&self) -> bool;
 
-    /// A piece that was not cut.
+    /// Called after a piece that was not cut.
     fn whole(&mut self, _stepper: &L::Stepper<'m, M>, _piece: &Piece<'_, N, L>) {}
 
-    /// A polynomial that is wanted.
+    /// Called with the polynomial of a piece if [`keeps`](Self::keeps).
     fn inside(&mut self, _dense: L::Polynomial) {}
 
-    /// A node at an event.
+    /// Called at the nodes before and after an event.
     fn at_event(
         &mut self,
         stepper: &mut L::Stepper<'m, M>,
@@ -63,7 +63,7 @@ pub(super) trait Observe<'m, M: 'm, const N: usize, L: Length<N> = FixedLength>:
         at: (f64, &L::State),
     );
 
-    /// Parameters, by their numbers, that were set at the time of the node that is to come.
+    /// Called with the parameters, by their indices, that were set at the time of the next node.
     fn changed(&mut self, _model: &Share<'m, M>, _values: &[(usize, f64)]) {}
 }
 
@@ -72,7 +72,7 @@ pub(super) trait Observe<'m, M: 'm, const N: usize, L: Length<N> = FixedLength>:
 pub(super) enum Left {
     /// At its end.
     Done,
-    /// At an event that ends the run, or at its end where a follower ends the run.
+    /// At an event that ends the run, or at its end if a follower ends the run there.
     Stopped,
 }
 
@@ -83,22 +83,22 @@ fn left(goes_on: ControlFlow<()>) -> Left {
     }
 }
 
-/// Why an element was not passed.
+/// The failure of an element.
 #[derive(Debug)]
 pub(super) struct Broken<const N: usize, L: Length<N> = FixedLength> {
     pub(super) kind: RunErrorKind,
-    /// Where the piece begins that could not be passed, with its length; none where a state after an event cannot be used.
+    /// Start, length and initial state of the piece that failed; `None` if a state after an event cannot be used.
     pub(super) piece: Option<(f64, f64, L::State)>,
 }
 
-/// Passes elements, with a look at events.
+/// Solves elements and looks for events in them.
 pub(super) struct Pieces<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
-    /// As events have left it.
+    /// The model with the parameters set by events so far.
     pub(super) model: Share<'m, M>,
     pub(super) events: Events<'m, M, N, L>,
-    /// Of an element that was looked into and is not kept.
+    /// The memory of a polynomial that was not kept.
     spare: Option<L::Polynomial>,
-    /// Whether parameters were set.
+    /// Whether events have set parameters.
     is_changed: bool,
 }
 
@@ -116,12 +116,12 @@ where
         }
     }
 
-    /// Whether parameters were set.
+    /// Whether events have set parameters.
     pub(super) fn is_changed(&self) -> bool {
         self.is_changed
     }
 
-    /// Moves a state from the start to the end of an element, or to the event that ends the run.
+    /// Advances a state to the end of an element, or to the event that ends the run.
     pub(super) fn pass(
         &mut self,
         stepper: &mut L::Stepper<'m, M>,
@@ -131,9 +131,10 @@ where
     ) -> Result<Left, Box<Broken<N, L>>> {
         let Planned { t, next, h, .. } = planned;
         self.events.begin(h);
-        // What is left of the element behind its last event.
+        // The rest of the element behind its last event.
         let (mut from, mut length) = (t, h);
-        // How many of its impulses have acted. What those at its start change is to be seen there by events; constraints take up a part of them in the element.
+        // The number of impulses that have acted. Those at the start act here, so that events see their effect; except
+        // under constraints, which react to them inside the element.
         let mut acted = match M::IS_CONSTRAINED || self.events.is_empty() {
             true => 0,
             false => self.model.kick_at(planned.impulses, (t, h), state),
@@ -190,7 +191,7 @@ where
             let good = changed.and_then(|()| self.model.check_restart(time, length, &after));
             good.map_err(|kind| Broken { kind, piece: None })?;
             if time == next {
-                // Those at the end of the run have no other piece.
+                // Impulses at the end of the run have no later piece to act in.
                 acted = acted.max(acting::behind(planned.impulses, next, h));
                 let ahead = &planned.impulses[acted..];
                 acted += self.model.kick_at(ahead, (next, h), &mut after);
@@ -206,7 +207,8 @@ where
         }
     }
 
-    /// Meets the events that come at the start of a piece, where another one has cut the element, up to the first that acts.
+    /// Meets the events that are due at the start of a piece, after another event has cut the element, up to the first
+    /// that ends a piece.
     fn pass_due(
         &mut self,
         piece: Planned<'_, N>,
@@ -237,7 +239,7 @@ where
         Ok(cut)
     }
 
-    /// Moves a state to the end of a piece, unless an event cuts it.
+    /// Advances a state to the end of a piece, or to the event that cuts it.
     fn pass_piece(
         &mut self,
         stepper: &mut L::Stepper<'m, M>,
@@ -258,7 +260,7 @@ where
             .map_err(|source| self.model.failed(number, (t, h), source))?;
         let keeps = observer.keeps();
         let looks = !self.events.is_empty() && !self.events.stays_clear(stepper, (t, h));
-        // Before a matrix, which needs the same memory.
+        // Before the transition matrix is computed, which uses the same memory.
         let dense = (keeps || looks).then(|| M::inside(stepper, self.spare.take(), (t, next)));
         let no_matrix = |source| RunErrorKind::Transition {
             element: number,
@@ -312,7 +314,7 @@ where
         Ok(None)
     }
 
-    /// Goes on with other parameters.
+    /// Continues with other parameters.
     fn change(
         &mut self,
         stepper: &mut L::Stepper<'m, M>,

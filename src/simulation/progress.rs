@@ -1,15 +1,15 @@
-//! Progress of a run.
+//! The progress bar of a run.
 
 use crate::progress::Progress;
 
-/// Counts steps, which are too short to be told one by one.
+/// Counts steps and reports them in groups.
 pub(super) struct Bar {
     progress: Progress,
     waiting: usize,
 }
 
 impl Bar {
-    /// Asking for the time costs more than a small step does.
+    /// The number of steps in a group; reading the clock costs more than a small step.
     const TOGETHER: usize = 256;
 
     pub(super) fn new(is_wanted: bool, steps: usize) -> Self {

@@ -1,4 +1,4 @@
-//! Keeps what a run passes as a motion, and notices what is doubtful about it.
+//! Records a run as a motion, and collects its warnings.
 
 use super::events::Severed;
 use super::follow::{Follow, Follower, Passed};
@@ -14,14 +14,14 @@ use std::ops::ControlFlow;
 use tfe_runtime::Share;
 use tfe_runtime::transition::TransitionError;
 
-/// Keeps what a run passes, and shows it to a follower.
+/// Records the elements that a run passes, and calls the follower.
 pub(super) struct Recorder<'f, 'm, M, const N: usize, L: Length<N>> {
     motion: Motion<N, L>,
     follower: Follower<'f, 'm, M, N, L>,
     watch: Watch,
     resolution: Resolution<'m, M, N, L>,
     record_every: usize,
-    /// Whether the energy is kept, by the model and since the last recorded node.
+    /// Whether energy is conserved, by the model and since the last recorded node.
     is_conserved: bool,
 }
 
@@ -30,7 +30,7 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Goes on from the only node of `motion`.
+    /// Begins with the only node of `motion`.
     pub(super) fn new(
         simulation: &Simulation<'m, M, N, L>,
         motion: Motion<N, L>,
@@ -52,7 +52,7 @@ where
         }
     }
 
-    /// Before an element.
+    /// Called before an element.
     pub(super) fn begin(
         &mut self,
         model: &M,
@@ -65,7 +65,7 @@ where
         self.is_conserved &= !has_impulses;
     }
 
-    /// After an element that ends at `t`.
+    /// Called after an element that ends at `t`.
     pub(super) fn end(
         &mut self,
         stepper: &mut L::Stepper<'m, M>,
@@ -86,7 +86,7 @@ where
         self.is_conserved = M::CONSERVES;
     }
 
-    /// After an element that was not passed.
+    /// Called after an element that failed.
     pub(super) fn fail(
         &mut self,
         stepper: &mut L::Stepper<'m, M>,
@@ -107,7 +107,7 @@ where
         M::record(&mut self.motion, stepper, model, at);
     }
 
-    /// Shows the last node to the follower.
+    /// Passes the last node to the follower.
     fn tell(&mut self) {
         if let Some(follower) = &mut self.follower {
             follower.recorded(self.motion.last());

@@ -1,4 +1,5 @@
-//! Whether elements resolve the motion: a second look at some of those whose iteration did not contract quickly (T-121).
+//! Checks whether elements resolve the motion: some of those whose iteration did not contract quickly are compared with
+//! shorter elements (T-121).
 
 use super::kind::{Chosen, Simulated};
 use crate::length::Length;
@@ -9,21 +10,21 @@ use tfe_runtime::{Share, Solve, Statistics};
 /// Compares elements with three of a third of the length, those that were cut with nine of a ninth: halves might be cut into the same pieces as the element.
 pub struct Resolution<'m, M: 'm, const N: usize, L: Length<N>> {
     again: Again<'m, M>,
-    /// The largest ratio of increments that is not doubtful.
+    /// The largest contraction ratio of an element that needs no comparison.
     quick: f64,
-    /// Made when it is first needed.
+    /// The stepper of comparisons; created when first needed.
     stepper: Option<L::Stepper<'m, M>>,
     doubtful: Sample,
-    /// Those among the doubtful ones that were cut, which are the first to be looked at.
+    /// Counts those among the doubtful elements that were cut, which are compared first.
     cut: Sample,
-    /// All elements so far.
+    /// The number of elements so far.
     passed: usize,
-    /// Newton iterations and cuts so far.
+    /// The numbers of Newton iterations and of cuts so far.
     work: (u64, u64),
-    /// Where the parts of the element before have ended, if it was compared.
+    /// The end of the shorter elements in the previous element, if it was compared.
     beside: Option<Beside<L::State>>,
     compared: Vec<Compared<L::State>>,
-    /// The least and the largest coordinates and momenta that were seen.
+    /// The least and the largest coordinates and momenta so far.
     bounds: Option<[L::State; 2]>,
 }
 
@@ -35,7 +36,7 @@ impl<M, const N: usize, L: Length<N>> fmt::Debug for Resolution<'_, M, N, L> {
     }
 }
 
-/// Takes the numbers 0, 1, 2, 4, 8, … of what there is.
+/// Selects the numbers 0, 1, 2, 4, 8, … of a sequence.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sample {
     count: usize,
@@ -43,7 +44,7 @@ struct Sample {
 }
 
 impl Sample {
-    /// Whether the next one is among them.
+    /// Counts an item; returns whether it is selected.
     fn takes(&mut self) -> bool {
         let number = self.count;
         self.count += 1;
@@ -69,15 +70,15 @@ pub struct Examined<'a, const N: usize, L: Length<N>> {
     pub(super) after: &'a L::State,
 }
 
-/// A motion in parts of elements beside that of the run.
+/// The states of the shorter elements and of the run, at the same time.
 #[derive(Clone, Debug)]
 struct Beside<S> {
     state: S,
-    /// Where the run has come to at the same time.
+    /// The state of the run.
     run: S,
 }
 
-/// By how much its end is away from that of its parts; infinite where these fail.
+/// An element and the difference of its end from that of the shorter elements; infinite if these fail.
 #[derive(Debug)]
 struct Compared<S> {
     t: f64,
@@ -90,16 +91,18 @@ where
     M: Simulated<N, L> + 'm,
     L: Length<N>,
 {
-    /// About the error of an element relative to the motion from which on it is looked at. A fixed point contracts by some (hω)², an element of order k is wrong by some (hω)ᵏ.
+    /// The approximate relative error of an element from which on it is compared. A fixed-point iteration contracts by
+    /// about (hω)²; the error of an element of order k is about (hω)ᵏ.
     const DOUBTFUL: f64 = 0.008;
 
-    /// The part of what the motion extends over that its parts may end elsewhere.
+    /// The largest acceptable difference relative to the extent of the motion.
     const MOST: f64 = 0.03;
 
-    /// Of models with more coordinates comparisons are to take no more than some tenth of the time of a run, unless elements are cut.
+    /// The number of coordinates above which comparisons are limited to about a tenth of the time of the run, unless
+    /// elements are cut.
     const MANY: usize = 64;
 
-    /// As many elements pay for one comparison.
+    /// The number of elements passed for each comparison in such models.
     const ELEMENTS_A_COMPARISON: usize = 24;
 
     pub(super) fn new(again: Again<'m, M>) -> Self {
@@ -117,31 +120,31 @@ where
         }
     }
 
-    /// Goes on with another model.
+    /// Replaces the model.
     pub(super) fn set_model(&mut self, model: Share<'m, M>) {
         (self.again.model, self.stepper) = (model, None);
     }
 
-    /// Compares the element if it is the next of those that are to be. Linear models are not looked at: what their elements are wrong by is known.
+    /// Compares the element if it is due. Linear models are skipped: the error of their elements is known.
     #[inline(always)]
     pub(super) fn look(&mut self, statistics: &Statistics, examined: Examined<'_, N, L>) {
         if M::FACTS.linear || self.again.chosen.control.solve == Solve::Trusting {
             return;
         }
-        // An element that was cut has the ratio of its last piece.
+        // The contraction ratio of an element that was cut is that of its last piece.
         let work = (statistics.newton_iterations, statistics.cuts);
         let (by_newton_or_cut, is_cut) = (work != self.work, work.1 != self.work.1);
         self.work = work;
         self.passed += 1;
         let is_due = self.is_due((by_newton_or_cut, is_cut), statistics, &examined);
         if is_due || self.beside.is_some() {
-            // Where an element was too long to be proven, a third of it may be, too.
+            // If an element was too long for its solution to be verified, a third of it may be, too.
             let parts = if is_cut { 9 } else { 3 };
             self.compare(is_due, parts, examined);
         }
     }
 
-    /// Whether the element is doubtful, and the next of those to be compared.
+    /// Whether the element is doubtful and selected.
     #[inline(always)]
     fn is_due(
         &mut self,
@@ -149,7 +152,7 @@ where
         statistics: &Statistics,
         examined: &Examined<'_, N, L>,
     ) -> bool {
-        // Zero where the last two increments tell nothing.
+        // Zero if the last two increments gave no ratio.
         let ratio = statistics.contraction.ratio();
         if !by_newton_or_cut && 0.0 < ratio && ratio <= self.quick {
             return false;
@@ -158,19 +161,19 @@ where
         (takes && self.is_paid_for(examined)) | (is_cut && self.cut.takes())
     }
 
-    /// Whether a comparison, and one with the element behind, is no great expense.
+    /// Whether a comparison, and one of the next element, would not cost too much.
     fn is_paid_for(&self, examined: &Examined<'_, N, L>) -> bool {
         let coordinates = L::parts(examined.before).0.as_ref().len();
         let comparisons = self.compared.len() + 2;
         coordinates <= Self::MANY || Self::ELEMENTS_A_COMPARISON * comparisons <= self.passed
     }
 
-    /// Compares an element with its parts if it is due, and with parts that begin where those of the element before have ended: they show what the model makes of the error of
-    /// that element.
+    /// Compares an element with shorter ones if it is due. After a compared element, the shorter elements are also
+    /// continued over this one: this shows how the error of the previous element develops.
     #[cold]
     #[inline(never)]
     fn compare(&mut self, is_due: bool, parts: u32, examined: Examined<'_, N, L>) {
-        // Not behind an act, which changes the state.
+        // Not after an action, which changes the state.
         let continued = |beside: &Beside<L::State>| beside.run == *examined.before;
         if let Some(beside) = self.beside.take().filter(continued) {
             self.compare_from(beside.state, parts, &examined);
@@ -183,7 +186,7 @@ where
         }
     }
 
-    /// Where so many parts from `start` end.
+    /// Compares the end of the element with that of `parts` shorter elements from `start`, and returns the latter.
     fn compare_from(
         &mut self,
         start: L::State,
@@ -197,7 +200,7 @@ where
         end
     }
 
-    /// None where they fail.
+    /// The end of the shorter elements; `None` if one fails.
     fn end_of_parts(
         &mut self,
         (t, h): (f64, f64),
@@ -218,7 +221,7 @@ where
         Some(state)
     }
 
-    /// Makes room for a state.
+    /// Extends the bounds to include a state.
     fn extend(&mut self, state: &L::State) {
         self.bounds = Some(match self.bounds.take() {
             Some(bounds) => extended::<N, L>(&bounds, state),
@@ -226,20 +229,20 @@ where
         });
     }
 
-    /// What is to be told of the elements of a run that has come to `last`.
+    /// The warning of a run whose last state is `last`, if elements do not resolve the motion.
     pub(super) fn warning(&self, last: &L::State) -> Option<Warning> {
         let [least, largest] = extended::<N, L>(self.bounds.as_ref()?, last);
         let extent = Extent::<N, L>::between(&least, &largest);
         let mut found = None;
         for Compared { t, h, off } in &self.compared {
             let part = extent.part(off);
-            // NaN tells nothing that others do not.
+            // A NaN has other warnings.
             if !(part > Self::MOST) {
                 continue;
             }
             let (_, _, distance, count, last) = found.get_or_insert((*t, *h, part, 0, f64::NAN));
             *distance = part.max(*distance);
-            // One may have been compared twice.
+            // The same element may have been compared twice.
             *count += usize::from(last != t);
             *last = *t;
         }
@@ -252,7 +255,7 @@ where
     }
 }
 
-/// What a function makes of the numbers of two states.
+/// Combines the components of two states.
 fn paired<const N: usize, L: Length<N>>(
     one: &L::State,
     other: &L::State,
@@ -266,7 +269,7 @@ fn paired<const N: usize, L: Length<N>>(
     L::state(vector(q, other_q), vector(p, other_p))
 }
 
-/// By how much the end of parts is away from that of an element.
+/// The difference between the end of the shorter elements and that of the element.
 fn off<const N: usize, L: Length<N>>(end: Option<&L::State>, after: &L::State) -> L::State {
     match end {
         Some(end) => paired::<N, L>(end, after, |end, after| end - after),
@@ -284,10 +287,10 @@ fn extended<const N: usize, L: Length<N>>(
     ]
 }
 
-/// What a motion extends over.
+/// The extent of a motion in phase space.
 struct Extent<const N: usize, L: Length<N>> {
     range: L::State,
-    /// The largest momenta; ones if there are none.
+    /// The largest momenta; ones if all are zero.
     weights: L::Vector,
 }
 
@@ -308,7 +311,8 @@ impl<const N: usize, L: Length<N>> Extent<N, L> {
         }
     }
 
-    /// How large a difference of positions or of momenta is. Positions count with momenta as weights, and momenta with positions, so that units do not matter.
+    /// A difference relative to the extent. Differences of positions are weighted with momenta, and those of momenta
+    /// with positions, so that units do not matter.
     fn part(&self, off: &L::State) -> f64 {
         let relative = |weights: &L::Vector, off: &L::Vector, range: &L::Vector| {
             let (mut distance, mut way) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Runs: from a start over a span, or without an end.
+//! Runs over a span, and endless runs.
 
 use super::events::Events;
 use super::follow::Follower;
@@ -46,7 +46,7 @@ where
     /// # }
     /// ```
     pub fn run(&self, start: L::State, span: Range<f64>) -> Result<Motion<N, L>, RunError<N, L>> {
-        // Events ask for the inside of nonlinear models only where one may be.
+        // For nonlinear models, polynomials inside elements are only computed where there may be an event.
         let looks_now_and_then = self.events.is_empty() || M::MAY_ITERATE;
         let ends_only = self.record_every != 1 && looks_now_and_then;
         let ready = |stepper| match ends_only {
@@ -56,7 +56,7 @@ where
         self.drive(start, &span, ready, None)
     }
 
-    /// Runs over the span, followed by `follower`.
+    /// Runs over the span and calls `follower`.
     pub(super) fn drive(
         &self,
         start: L::State,
@@ -82,7 +82,7 @@ where
         self.drive_on(motion, &start, place, ready(stepper), follower)
     }
 
-    /// Goes on from the only node of `motion` over a mesh of which some elements are done, and leaves a checkpoint.
+    /// Continues from the only node of `motion` over a mesh of which `done` elements are done, and leaves a checkpoint.
     pub(super) fn drive_on(
         &self,
         motion: Motion<N, L>,
@@ -98,12 +98,13 @@ where
         if seen.has_stopped {
             motion.set_stopped();
         }
-        // A run that was stopped has no grid to go on with, and one whose parameters were set no model.
+        // A run that an event has stopped has no grid to continue on; one whose parameters were set would need another
+        // model.
         if motion.is_stopped() || !motion.settings().is_empty() {
             return Ok(motion);
         }
         let last = motion.last();
-        // Where nothing was to be done the grid is that of before.
+        // If there was nothing to do, the grid is that of the checkpoint.
         let same = before.filter(|_| mesh.steps() == done);
         let direction = before.map_or(0.0, |reached| reached.direction);
         let checkpoint = Checkpoint {
@@ -120,7 +121,7 @@ where
         Ok(motion)
     }
 
-    /// Runs over a mesh with a stepper at rest.
+    /// Runs over a mesh with a new stepper.
     pub(super) fn drive_over(
         &self,
         (t0, start): (f64, &L::State),
@@ -133,7 +134,8 @@ where
         self.drive_from(motion, start, place, stepper, follower)
     }
 
-    /// The same from the only node of `motion`, after the elements that are done. What was seen of events there becomes what is seen at the end.
+    /// The same from the only node of `motion`, after the elements that are done. `seen` is the record of events at the
+    /// start; it becomes that at the end.
     fn drive_from(
         &self,
         motion: Motion<N, L>,
@@ -204,7 +206,7 @@ where
         }
     }
 
-    /// What passes elements, with a look at events.
+    /// The part that solves elements and looks for events.
     pub(super) fn pieces(
         &self,
         stepper: &L::Stepper<'m, M>,
@@ -219,7 +221,7 @@ where
         Ok(Pieces::new(self.model.clone(), events))
     }
 
-    /// Whether the run can begin at `start`.
+    /// Checks whether the run can begin at `start`.
     pub(super) fn check_start(&self, start: &L::State) -> Result<(), RunErrorKind> {
         match &self.refusal {
             Some(refusal) => Err(refusal.clone()),
@@ -227,7 +229,7 @@ where
         }
     }
 
-    /// The elements of a run and its stepper, if all arguments are good.
+    /// Checks the arguments; returns the mesh and the stepper of a run.
     pub(super) fn prepare(
         &self,
         start: &L::State,
@@ -285,7 +287,7 @@ where
         begun.unwrap_or_else(|| new(Err(RunErrorKind::panicked(t0))))
     }
 
-    /// The beginning of a course without an end.
+    /// Prepares a run without an end.
     pub(super) fn endless(&self, start: &L::State, t0: f64) -> Beginning<'m, M, N, L> {
         let step = self.step.unwrap_or(f64::NAN);
         self.check_start(start)?;

@@ -1,4 +1,4 @@
-//! Sections of Poincaré: where a motion without an end crosses a surface.
+//! Poincaré sections: the points where a motion crosses a surface.
 
 use super::checks::check_kinks;
 use super::course::Course;
@@ -148,7 +148,7 @@ where
 
 /// A model that has Poincaré sections; points of models of fixed size can have transition matrices.
 pub trait Sectioned<const N: usize, L: Length<N>>: Simulated<N, L> {
-    /// What carries them along.
+    /// The type that carries the derivatives along.
     type Tangents<'m>: Carry<'m, Self, N, L>
     where
         Self: 'm;
@@ -170,7 +170,7 @@ impl<M: family::Model> Sectioned<0, RunTimeLength> for M {
 
 /// Propagates transition matrices from point to point.
 pub trait Carry<'m, M: 'm, const N: usize, L: Length<N>>: Follow<'m, M, N, L> {
-    /// The matrix up to a point.
+    /// The transition matrix up to a crossing.
     fn crossed(&mut self, severed: &Severed<'_, 'm, N, L>)
     -> Result<DMatrix<f64>, TransitionError>;
 }
@@ -237,7 +237,7 @@ where
             }
             match self.way.pass(&mut self.crossings)? {
                 Ok((Left::Done, _)) => {}
-                // Points before the end may be left.
+                // Points before the end may still be in the queue.
                 Ok((Left::Stopped, _)) => return self.crossings.points.pop_front(),
                 Err(kind) => self.crossings.points.push_back(Err(kind)),
             }
@@ -245,12 +245,13 @@ where
     }
 }
 
-/// The section, among all events: what another one does on its surface comes after the point.
+/// The index of the section among the events: it comes first, so that the actions of other events on the surface come
+/// after the point.
 const SECTION: usize = 0;
 
-/// Lines up the points of an element.
+/// Collects the crossings of an element.
 struct Crossings<'m, M: Sectioned<N, L> + 'm, const N: usize, L: Length<N>> {
-    /// Since the last point.
+    /// The derivatives since the last crossing.
     tangents: Option<M::Tangents<'m>>,
     points: VecDeque<Result<SectionPoint<N, L>, RunErrorKind>>,
 }

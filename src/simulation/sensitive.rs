@@ -52,7 +52,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         }
     }
 
-    /// The same at the nodes alone.
+    /// The same at nodes only.
     pub(super) fn run_sensitive_at_nodes(
         &self,
         start: State<N>,
@@ -62,7 +62,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         self.differentiated(start, span, self.tangents(&all))
     }
 
-    /// The same by some of the parameters, at the nodes alone.
+    /// The same by some of the parameters, at nodes only.
     #[cfg(feature = "fit")]
     pub(crate) fn run_sensitive_by(
         &self,
@@ -97,36 +97,37 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 pub struct Tangents<'m, M, const N: usize> {
     model: Share<'m, M>,
     chosen: (Element, Control),
-    /// The parameters, among all, and as directions.
+    /// The parameters: their indices, and their directions.
     indices: Vec<usize>,
     parameters: Vec<Direction>,
-    /// Where the run is.
+    /// The derivatives at the current state.
     before: Before,
-    /// ∂(p, q)/∂(start, parameters) after an act that is to come.
+    /// ∂(p, q)/∂(start, parameters) after the action that follows.
     acted: Option<DMatrix<f64>>,
-    /// A parameter that this act sets to a value which depends on the state.
+    /// The error of an action that sets a parameter to a value which depends on the state.
     dependent: Option<RunErrorKind>,
     nodes: Vec<Slopes>,
-    /// Along the elements so far, where that is asked for.
+    /// The derivatives along the elements so far, if asked for.
     inside: Option<Vec<Inside>>,
     events: Vec<(usize, Vec<f64>)>,
-    /// Solves elements that events have cut.
+    /// A stepper for elements that events have cut.
     probe: Option<Stepper<'m, M, N>>,
-    /// The motions that constraints allow where derivatives are counted from, of models with constraints: `None` before the first element.
+    /// A basis of the motions that the constraints allow at the point from which derivatives are counted, for models
+    /// with constraints; `None` before the first element.
     counted_from: Option<Result<DMatrix<f64>, StepError>>,
 }
 
-/// The derivatives of an element.
+/// The derivatives over an element.
 struct Across {
     /// Of its end.
     end: DMatrix<f64>,
-    /// Of its end by more directions.
+    /// Of its end, in further directions.
     more: DMatrix<f64>,
-    /// Along it, by its start and all directions, where that is asked for.
+    /// Along the element, by its start and all directions, if asked for.
     inside: Vec<InsideSlopes>,
 }
 
-/// The start of an element moves, its end does not.
+/// The start of the element moves in time, its end does not.
 const START: Direction = Direction {
     time: 1.0,
     length: -1.0,
@@ -134,7 +135,7 @@ const START: Direction = Direction {
     damping: 0.0,
 };
 
-/// The end moves alone.
+/// Only the end moves in time.
 const END: Direction = Direction {
     time: 0.0,
     length: 1.0,
@@ -165,7 +166,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         }
     }
 
-    /// Keeps derivatives along the elements, too.
+    /// Also keeps the derivatives along elements.
     fn with_inside(self) -> Self {
         Self {
             inside: Some(Vec::new()),
@@ -173,14 +174,15 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         }
     }
 
-    /// The derivatives since the start, or since this was last called, from where they are counted anew.
+    /// Returns the derivatives since the start or the last call, and counts them anew from here.
     pub(super) fn restart(&mut self) -> DMatrix<f64> {
         let columns = self.columns();
         (self.before.start, self.counted_from) = (None, None);
         std::mem::replace(&mut self.before.state, DMatrix::identity(2 * N, columns))
     }
 
-    /// The derivative of the state at an event that changes nothing, with its time; from there on derivatives are counted anew.
+    /// The derivative of the state at an event without action, including its time; derivatives are counted anew from
+    /// there.
     pub(super) fn crossed(
         &mut self,
         severed: &Severed<'_, 'm, N>,
@@ -191,7 +193,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             ..
         } = self.up_to(severed)?;
         let times = self.times(severed, (&at, &rate))?;
-        // Where the element begins, by the state at the event at a fixed time.
+        // The start of the element, differentiated by the state at the event at a fixed time.
         let back = self.inverse(&at, severed)?;
         if let Some(moved) = &mut self.before.start {
             let row = DMatrix::from_row_slice(1, moved.len(), moved) * &back;
@@ -205,20 +207,20 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         Ok(matrix)
     }
 
-    /// Derivatives are counted from here, if they are not yet from anywhere.
+    /// Counts derivatives from this state, if they are not yet counted from an earlier one.
     fn count_from(&mut self, t: f64, state: &State<N>) {
         if const { !M::CONSTRAINTS.is_empty() } && self.counted_from.is_none() {
             self.counted_from = Some(self.basis(t, state));
         }
     }
 
-    /// The motions that constraints allow at a state, with the parameters that hold now.
+    /// A basis of the motions that the constraints allow at a state, with the current parameters.
     pub(super) fn basis(&self, t: f64, state: &State<N>) -> Result<DMatrix<f64>, StepError> {
         tangent_basis(&*self.model, t, state)
     }
 
-    /// The inverse of the derivative of an event's state by that at the point before; with constraints on the motions that these allow (T-78): of other directions nothing is left
-    /// at the event.
+    /// The inverse of the derivative of the state at an event by that at the previous point. With constraints it acts
+    /// on the motions that these allow (T-78); other directions vanish at the event.
     fn inverse(
         &mut self,
         at: &DMatrix<f64>,
@@ -243,14 +245,14 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         Ok(before * (back * here.transpose()))
     }
 
-    /// By how much every column moves the time of an event: g(t*, y(t*)) = 0, so ġ dt* = −δg. Where g has jumped over zero at the start of an
-    /// element, by an impulse or an act, it moves as that start does.
+    /// The derivative of the time of an event by each column, from g(t*, y(t*)) = 0: ġ dt* = −δg. If g has jumped over
+    /// zero at the start of an element, by an impulse or an action, the time is that of the start.
     fn times(
         &self,
         severed: &Severed<'_, 'm, N>,
         (at, rate): (&DMatrix<f64>, &DMatrix<f64>),
     ) -> Result<Vec<f64>, TransitionError> {
-        /// How far from zero it is then, as a part of what it does in a step.
+        /// The least distance of g from zero after a jump, relative to its change in a step.
         const JUMPED: f64 = 1e-6;
 
         let event = severed.event;
@@ -301,12 +303,12 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         self.before.state.ncols()
     }
 
-    /// The parameter that a column is by, among all.
+    /// The index of the parameter of a column; `None` for a column of the start.
     fn parameter(&self, column: usize) -> Option<usize> {
         self.indices.get(column.checked_sub(2 * N)?).copied()
     }
 
-    /// The derivatives of an element that `stepper` has done last.
+    /// The derivatives over the last element of `stepper`.
     fn across(
         &self,
         stepper: &mut Stepper<'m, M, N>,
@@ -325,14 +327,14 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         let matrix = DMatrix::from_row_slice(2 * N, all, &entries);
         let more = matrix.columns(all - more.len(), more.len()).into_owned();
         let end = self.before.through(&matrix, None);
-        // Of many elements, each of which may be finite.
+        // A product over many elements can overflow although each factor is finite.
         if !end.iter().all(|one| one.is_finite()) {
             return Err(StepError::NonFinite.into());
         }
         Ok(Across { end, more, inside })
     }
 
-    /// Keeps the derivatives along an element that `stepper` has done last, whose end moves where it is said how.
+    /// Keeps the derivatives along the last element of `stepper`, whose end moves in time as given.
     fn keep(
         &mut self,
         stepper: &Stepper<'m, M, N>,
@@ -372,7 +374,8 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         self.inside = Some(inside);
     }
 
-    /// The derivatives where an event has cut an element, before anything is done, at a fixed time, and with them the rate of the state there.
+    /// The derivatives at fixed time at an event that cuts an element, before its action, together with the time
+    /// derivative of the state.
     fn up_to(&mut self, severed: &Severed<'_, '_, N>) -> Result<Across, TransitionError> {
         if severed.inside {
             let (element, control) = self.chosen;
@@ -387,7 +390,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             self.probe = Some(probe);
             return found;
         }
-        // Where the element begins.
+        // The start of the element.
         if const { !M::CONSTRAINTS.is_empty() } {
             return Err(TransitionError::NoStep);
         }
@@ -411,7 +414,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         }
         let mut next = self.before.state.clone();
         if let Some(moved) = &self.before.start {
-            // Time to the fixed place is what the start gains.
+            // A later start shortens the time to the fixed end.
             for (mut column, dt) in next.column_iter_mut().zip(moved) {
                 column.axpy(-dt, &rate.column(0), 1.0);
             }
@@ -492,7 +495,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
                 times: &times,
             };
             self.acted = Some(acting.after(|column| self.parameter(column))?);
-            // With parameters, nothing that is set is differentiated.
+            // If derivatives by parameters are asked for, actions that set parameters have been refused.
             if self.indices.is_empty() {
                 self.dependent = acting.dependent();
             }
@@ -525,7 +528,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
         };
         for column in 0..columns {
             let change = Change {
-                // At an event the time moves, too.
+                // The time of an event moves, too.
                 t: self
                     .before
                     .start

@@ -1,4 +1,4 @@
-//! A run to be: a model, an element, a step, and what else is asked for; of models of either kind of length.
+//! The definition of a run: model, element, step and all options, for models of either kind of length.
 
 use super::events::remodel::remodel;
 use super::events::watching::Watching;
@@ -78,7 +78,7 @@ use tfe_runtime::{Element, Mixed, Model, Solve};
 #[derive(Debug)]
 pub struct Simulation<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(super) model: Share<'m, M>,
-    /// The default where it is not chosen.
+    /// `None`: the default element.
     pub(super) element: Option<Element>,
     pub(super) step: Option<f64>,
     pub(super) nodes: Option<Vec<f64>>,
@@ -87,10 +87,10 @@ pub struct Simulation<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(super) impulses: Vec<L::Impulse>,
     pub(super) breaks: Vec<f64>,
     pub(super) events: Watching<'m, M, N, L>,
-    /// What was asked for.
+    /// `None`: the default of the call.
     pub(super) at_kinks: Option<bool>,
     pub(super) progress: bool,
-    /// What was asked for and cannot be done.
+    /// The error of an option that cannot be used; returned when the run begins.
     pub(super) refusal: Option<RunErrorKind>,
 }
 
@@ -280,7 +280,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         self
     }
 
-    /// How elements are solved.
+    /// Sets how elements are solved.
     pub(crate) fn with_control(self, control: Control) -> Self {
         Self { control, ..self }
     }
@@ -289,13 +289,13 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         &self.model
     }
 
-    /// What it looks for.
+    /// Sets the events.
     pub(crate) fn watching(self, events: &Watching<'m, M, N, L>) -> Self {
         let events = events.clone();
         Self { events, ..self }
     }
 
-    /// With what elements are looked at a second time.
+    /// The model and the solver for comparisons of elements.
     pub(super) fn again(&self) -> Again<'m, M> {
         Again {
             model: self.model.clone(),
@@ -303,14 +303,14 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         }
     }
 
-    /// Lets elements end where a loss looks at the motion.
+    /// Makes elements end at the times at which a loss observes the motion.
     pub(super) fn look_at(&mut self, loss: &Loss<'_, N, L>, span: &Range<f64>) {
         let nodes = self.nodes.as_deref().unwrap_or_default();
         let known = [nodes, &self.breaks[..], &[span.start, span.end]].concat();
         self.breaks.extend(loss.nodes(&known));
     }
 
-    /// What was asked of the elements.
+    /// The options of the mesh.
     pub(super) fn grid(&self) -> Grid<'_, L::Impulse> {
         Grid {
             step: self.step,
@@ -320,7 +320,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         }
     }
 
-    /// How elements are solved.
+    /// The element and how it is solved.
     pub(super) fn chosen(&self) -> Chosen {
         Chosen {
             element: self.chosen_element(),
@@ -356,7 +356,7 @@ where
     M: Simulated<N, L> + Send + Sync + 'm,
     L: Length<N>,
 {
-    /// The same of the model with another value of a parameter, if one can be made.
+    /// The same run with another value of a parameter, if the parameters of the model can be set.
     pub(crate) fn with_parameter(&self, index: usize, value: f64) -> Option<Self> {
         Some(Self {
             model: remodel(&*self.model, &[(index, value)])?,

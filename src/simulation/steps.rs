@@ -1,4 +1,4 @@
-//! The endless sequence of states.
+//! The endless sequence of nodes of a run.
 
 use super::course::{Course, Leg};
 use super::follow::Follow;
@@ -19,9 +19,9 @@ use tfe_runtime::Statistics;
 /// An endless iterator over the nodes of a motion, made by [`Simulation::steps`](crate::Simulation::steps).
 pub struct Steps<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     way: Way<'m, M, N, L>,
-    /// Of the last node, from where the next is looked for.
+    /// The velocity of the last node: the first guess for that of the next.
     velocity: L::Vector,
-    /// Nodes at events that are to be told yet.
+    /// Nodes at events that are still to be returned.
     nodes: VecDeque<Result<Node<N, L>, RunErrorKind>>,
     rows: Rows,
     watch: Watch,
@@ -37,21 +37,21 @@ impl<M, const N: usize, L: Length<N>> fmt::Debug for Steps<'_, M, N, L> {
     }
 }
 
-/// A stepper with its state on an endless course.
+/// A stepper and its state in an endless run.
 pub(super) struct Way<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
-    /// As it was at first.
+    /// The model at the start.
     model: Share<'m, M>,
     pub(super) course: Course<L::Stepper<'m, M>>,
     pub(super) state: L::State,
-    /// In the order in which the course meets them.
+    /// In the order in which the run passes them.
     impulses: Vec<L::Impulse>,
-    /// None where no events are looked for.
+    /// `None` if no events are looked for.
     pub(super) pieces: Option<Box<Pieces<'m, M, N, L>>>,
-    /// Of a course that has ended.
+    /// The work of a run that has ended.
     statistics: Statistics,
 }
 
-/// The beginning of a course: a stepper, its elements, and what looks for events.
+/// The beginning of an endless run: its stepper, its elements, and the search for events.
 pub(super) type Beginning<'m, M, const N: usize, L> = Result<
     (
         <L as Length<N>>::Stepper<'m, M>,
@@ -91,7 +91,7 @@ where
         }
     }
 
-    /// The next element, looked into for events; none after the end.
+    /// Solves the next element and looks for events in it; `None` after the end.
     pub(super) fn pass(
         &mut self,
         observer: &mut impl Observe<'m, M, N, L>,
@@ -180,7 +180,7 @@ where
         warnings
     }
 
-    /// The model as events have left it.
+    /// The model with the parameters set by events so far.
     pub(super) fn model(&self) -> &M {
         match &self.way.pieces {
             Some(pieces) => &pieces.model,
@@ -188,14 +188,14 @@ where
         }
     }
 
-    /// Inputs of the model have other values from the next step on.
+    /// The inputs of the model have other values from the next step on.
     pub(super) fn set_inputs(&mut self) {
         if let Some(pieces) = &mut self.way.pieces {
             pieces.events.set_inputs();
         }
     }
 
-    /// From now on keeps so many outputs with each node that is to be told yet; those of this node are the first.
+    /// From now on keeps the outputs of each node until it is returned, beginning with this node.
     pub(super) fn keep_outputs(&mut self, count: usize, node: &Node<N, L>) {
         let mut row = vec![0.0; count];
         if count > 0 {
@@ -204,7 +204,7 @@ where
         self.rows.row = row;
     }
 
-    /// The outputs at the node given last: of the model and with the inputs that it was passed with.
+    /// Writes the outputs at the node returned last, with the model and the inputs of that time.
     pub(super) fn outputs(&self, last: &Node<N, L>, values: &mut [f64]) {
         match &self.way.pieces {
             Some(_) => values.copy_from_slice(&self.rows.row),
@@ -212,7 +212,7 @@ where
         }
     }
 
-    /// The node from which the next step goes, unless the steps have ended.
+    /// The node at which the next step begins, unless the run has ended.
     pub(super) fn node(&self) -> Option<Node<N, L>> {
         let t = self.way.course.time()?;
         Some(Node::of(t, &self.way.state, self.velocity.clone()))
@@ -229,7 +229,7 @@ where
         (self.way.pieces.as_ref()).map_or(&[], |pieces| &pieces.events.met)
     }
 
-    /// A step that is looked into for events.
+    /// Solves a step and looks for events in it.
     fn look(&mut self) {
         let mut observer = Nodes {
             nodes: &mut self.nodes,
@@ -327,17 +327,17 @@ where
     }
 }
 
-/// Outputs of the nodes that are to be told yet, where they are asked for.
+/// The outputs of nodes that are still to be returned, if asked for.
 #[derive(Default)]
 struct Rows {
-    /// One row after the other.
+    /// The rows of outputs, concatenated.
     queued: VecDeque<f64>,
-    /// Those of the node told last; none where outputs are not asked for.
+    /// The outputs of the node returned last; empty if outputs are not asked for.
     row: Vec<f64>,
 }
 
 impl Rows {
-    /// Of a node that is told after all others.
+    /// Adds the outputs of a node that is returned after all others.
     fn push<M, const N: usize, L>(&mut self, model: &M, node: &Node<N, L>)
     where
         M: Simulated<N, L>,
@@ -349,7 +349,7 @@ impl Rows {
         }
     }
 
-    /// The next node is told.
+    /// Moves to the next node.
     fn pop(&mut self) {
         for value in &mut self.row {
             *value = self.queued.pop_front().unwrap_or(f64::NAN);
@@ -357,7 +357,7 @@ impl Rows {
     }
 }
 
-/// The outputs at a node; NaN where they cannot be evaluated.
+/// Writes the outputs at a node; NaN if they cannot be evaluated.
 fn write_outputs<M, const N: usize, L>(model: &M, node: &Node<N, L>, values: &mut [f64])
 where
     M: Simulated<N, L>,
@@ -370,12 +370,12 @@ where
     }
 }
 
-/// Lines up the nodes of an element.
+/// Collects the nodes of an element.
 struct Nodes<'a, 'm, M, const N: usize, L: Length<N>> {
     nodes: &'a mut VecDeque<Result<Node<N, L>, RunErrorKind>>,
     rows: &'a mut Rows,
     velocity: &'a mut L::Vector,
-    /// The time of the last one.
+    /// The time of the last node.
     last: f64,
     watch: &'a mut Watch,
     resolution: &'a mut Resolution<'m, M, N, L>,
@@ -388,7 +388,7 @@ where
 {
     fn push(&mut self, stepper: &mut L::Stepper<'m, M>, model: &M, at: (f64, &L::State)) {
         let node = M::node(stepper, model, at, self.velocity);
-        // Acts change the energy.
+        // Actions change the energy.
         self.watch.pass(Recorded::of(model, &node, false), &|| 0.0);
         self.velocity.clone_from(&node.v);
         self.last = node.t;

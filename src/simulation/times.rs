@@ -1,4 +1,4 @@
-//! When elements begin and end: equal steps between breaks, or between given nodes.
+//! The times of elements: equal steps between breaks, or between given nodes.
 
 use crate::error::RunErrorKind;
 use crate::motion::{
@@ -7,21 +7,21 @@ use crate::motion::{
 };
 use std::ops::Range;
 
-/// Times between two breaks, cut into equal steps; the last one may be shorter.
+/// A time interval divided into equal steps; the last one may be shorter.
 #[derive(Clone, Debug, PartialEq)]
 struct Segment {
     start: f64,
     end: f64,
-    /// Signed.
+    /// With sign.
     step: f64,
     steps: usize,
     /// Whether the last step is as long as the others.
     whole: bool,
-    /// Whether it begins and ends at a break.
+    /// Whether the interval begins and ends at a break.
     at_break: (bool, bool),
 }
 
-/// Refuses a span that is none, and a step with which it cannot be cut.
+/// Refuses an invalid span, and a step that cannot divide it.
 pub(super) fn check_span(span: &Range<f64>, step: f64) -> Result<(), RunErrorKind> {
     let Range { start, end } = *span;
     if !(start.is_finite() && end.is_finite()) {
@@ -33,11 +33,11 @@ pub(super) fn check_span(span: &Range<f64>, step: f64) -> Result<(), RunErrorKin
     Ok(())
 }
 
-/// When the elements of a span begin and end, whatever they are of.
+/// The times of the elements of a span.
 #[derive(Clone, Debug)]
 pub(super) struct Times {
     segments: Vec<Segment>,
-    /// One, or minus one where the run goes back in time.
+    /// 1, or −1 in backward integration.
     pub(super) direction: f64,
     pub(super) has_breaks: bool,
 }
@@ -71,13 +71,13 @@ impl Times {
         })
     }
 
-    /// The parts between `cuts`, each in equal steps of at most `step`. Some of the cuts may be `breaks`.
+    /// Divides each part between `cuts` into equal steps of at most `step`. Some of the cuts may be `breaks`.
     pub(super) fn even(cuts: &[f64], step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
         let (start, end) = ends(cuts);
         let direction = direction_of(&(start..end));
         let mut breaks = breaks.to_vec();
         sort_times(&mut breaks, direction);
-        // Elsewhere nothing may be lost: a rounding at each of many cuts would add up.
+        // At the other cuts the length must not change: an ulp at each of many cuts would add up.
         let is_break = |time: f64| is_among(&breaks, time, direction);
         let segment = |pair: &[f64]| {
             let steps = ((pair[1] - pair[0]).abs() / step).ceil().max(1.0);
@@ -95,7 +95,7 @@ impl Times {
         })
     }
 
-    /// The elements between nodes that begin and end with the span, cut at every break besides.
+    /// The elements between given nodes, which begin and end with the span; breaks are added to the nodes.
     pub(super) fn through(
         span: &Range<f64>,
         nodes: &[f64],
@@ -104,7 +104,7 @@ impl Times {
         let Range { start, end } = *span;
         let direction = direction_of(span);
         let has_breaks = !breaks.is_empty();
-        // A span of roundings is none.
+        // An interval of a few ulps is dropped.
         Self::new(span, end - start, &[])?;
         check_nodes(span, nodes, direction)?;
         let mut nodes = nodes.to_vec();
@@ -136,8 +136,8 @@ impl Times {
         self.segments.last().map(|segment| segment.end)
     }
 
-    /// Start, end and length of each element. One ends where the next one starts, to the bit; lengths are equal to the bit, which differences of times
-    /// are not, so that what was factored for one element serves the next.
+    /// Start, end and length of each element. An element ends exactly where the next one starts. Lengths of equal steps
+    /// are equal to the bit, unlike differences of times, so that one factorisation serves many elements.
     pub(super) fn elements(&self) -> Elements<'_> {
         Elements {
             segments: &self.segments,
@@ -145,8 +145,8 @@ impl Times {
         }
     }
 
-    /// Where the force is first felt in the element that begins at `t` and has the length `h`: at `t`, or beyond it by roundings where that is a break, so that an
-    /// element with a point at its start finds the force after the break there. Without breaks it is `t`.
+    /// The time at which the force is first evaluated in the element that begins at `t` and has the length `h`: `t`, or
+    /// a few ulps later if `t` is a break, so that an element with a point at its start sees the force after the break.
     pub(super) fn begin(&self, t: f64, h: f64) -> f64 {
         let is_before = |segment: &Segment| self.direction * segment.start < self.direction * t;
         let segment = self.segments.get(self.segments.partition_point(is_before));
@@ -157,12 +157,12 @@ impl Times {
     }
 }
 
-/// Elements one after the other: [`Times::elements`].
+/// The iterator of [`Times::elements`].
 #[derive(Clone)]
 pub(crate) struct Elements<'a> {
-    /// With those to come.
+    /// The current segment and those to come.
     segments: &'a [Segment],
-    /// Elements of the first of them that are behind.
+    /// The number of elements of the current segment that are done.
     done: usize,
 }
 
@@ -198,13 +198,13 @@ impl Iterator for Elements<'_> {
     }
 }
 
-/// The elements of a run without an end.
+/// The elements of an endless run.
 #[derive(Clone, Debug)]
 pub(crate) struct Endless {
-    /// Up to the last break, and a last one beyond it.
+    /// The segments up to the last break, and an unlimited one after it.
     segments: Vec<Segment>,
     segment: usize,
-    /// Elements of this segment that are behind.
+    /// The number of elements of the current segment that are done.
     done: usize,
 }
 
@@ -239,7 +239,7 @@ impl Endless {
         })
     }
 
-    /// Start, end and length of the next element, and where the force is first felt in it.
+    /// Start, end and length of the next element, and the time at which the force is first evaluated in it.
     pub(crate) fn element(&self) -> (f64, f64, f64, f64) {
         let (segment, k) = (&self.segments[self.segment], self.done);
         let (t, next, h) = (segment.node(k), segment.node(k + 1), segment.length(k));
@@ -267,24 +267,25 @@ pub(super) fn ends(times: &[f64]) -> (f64, f64) {
     }
 }
 
-/// The length of an element that ends at a break: shorter by roundings, so that an element with a point at its end finds the force before the break there.
+/// The length of an element that ends at a break: a few ulps shorter, so that an element with a point at its end sees
+/// the force before the break.
 pub(crate) fn up_to_break(start: f64, end: f64) -> f64 {
     (end - start) - rounding(end, end - start)
 }
 
-/// Whether a time is one of some in the order of a run, but for rounding.
+/// Whether a time is one of a list in the order of the run, up to rounding.
 fn is_among(times: &[f64], time: f64, direction: f64) -> bool {
     let after = times.partition_point(|one| direction * one < direction * time);
     let near = &times[after.saturating_sub(1)..times.len().min(after + 1)];
     near.iter().any(|one| is_same_time(*one, time))
 }
 
-/// Some roundings of the time, in the direction of the run.
+/// A few ulps of the time, in the direction of the run.
 fn rounding(t: f64, h: f64) -> f64 {
     h.signum() * 4.0 * f64::EPSILON * t.abs().max(h.abs())
 }
 
-/// Refuses nodes that are not those of a run over the span.
+/// Refuses nodes that do not form a run over the span.
 fn check_nodes(span: &Range<f64>, nodes: &[f64], direction: f64) -> Result<(), RunErrorKind> {
     let Range { start, end } = *span;
     let follows = |k: usize| k == 0 || direction * nodes[k - 1] < direction * nodes[k];
@@ -306,7 +307,7 @@ fn check_nodes(span: &Range<f64>, nodes: &[f64], direction: f64) -> Result<(), R
     }
 }
 
-/// Refuses steps that are roundings of the time: nodes would share times, and points of an element, too.
+/// Refuses steps of a few ulps of the time: nodes, or points of an element, would coincide.
 fn check_resolution(time: f64, step: f64) -> Result<(), RunErrorKind> {
     let least = LEAST_ROUNDINGS * f64::EPSILON * time.abs();
     if step.abs() < least {
@@ -315,7 +316,8 @@ fn check_resolution(time: f64, step: f64) -> Result<(), RunErrorKind> {
     Ok(())
 }
 
-/// A segment for each element. Where lengths in a row differ by roundings alone they are made equal to the bit, without changing their sum.
+/// Makes a segment for each element. Successive lengths that differ by rounding only are made equal to the bit, without
+/// changing their sum.
 fn single_steps(nodes: &[f64]) -> Vec<Segment> {
     let mut segments: Vec<Segment> = Vec::with_capacity(nodes.len().saturating_sub(1));
     let mut from = 0;
@@ -351,7 +353,8 @@ impl Segment {
         }
         let span = start..end;
         let (steps, whole) = count_steps(&span, step);
-        // A step that leads to the end but for rounding stays as it was given, so that runs to different ends have the same nodes.
+        // A step that reaches the end up to rounding is kept as given, so that runs to different ends share their
+        // nodes.
         let step = if whole && !leads_to_end(&span, step, steps) {
             (end - start) / steps
         } else {
@@ -389,7 +392,7 @@ impl Segment {
         length
     }
 
-    /// The k-th node: a product, not a sum, and the end of the segment exactly.
+    /// The k-th node: computed by a product, not a sum; the last one is exactly the end.
     fn node(&self, k: usize) -> f64 {
         if k == self.steps {
             self.end

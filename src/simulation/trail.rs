@@ -1,4 +1,4 @@
-//! What a run of a model of run-time length leaves behind for its derivatives.
+//! The record of a run of a model of run-time length, from which its derivatives are computed.
 
 use super::acting;
 use super::events::Severed;
@@ -12,33 +12,33 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::transition::TransitionError;
 
-/// What has no derivatives.
+/// The part of an error message about runs that have no derivatives.
 pub(super) const LONG_STEPS: &str =
     "models of run-time length where steps were so long that they were cut";
 
-/// An element that was passed; whoever solves it once more needs the feature `sparse`.
+/// An element of the run; the feature `sparse` is needed to solve it again.
 #[cfg_attr(not(feature = "sparse"), expect(dead_code))]
 pub(super) struct Element {
-    /// Where it was begun.
+    /// The start of the element as solved; a few ulps after a break.
     pub(super) t: f64,
     pub(super) h: f64,
     pub(super) before: FamilyState,
     after: FamilyState,
-    /// An impulse before it, of a model with constraints.
+    /// The impulse at its start, for a model with constraints.
     pub(super) kicked: Option<Kicked>,
 }
 
-/// Where impulses acted on a model with constraints, which take up a part of them at once.
+/// The states around an impulse on a model with constraints, which react to a part of it at once.
 #[cfg_attr(not(feature = "sparse"), expect(dead_code))]
 pub(super) struct Kicked {
-    /// The state before.
+    /// The state before the impulse.
     pub(super) before: FamilyState,
-    /// Its momentum with the impulses, none of them taken up yet.
+    /// The state with the whole impulse added to its momentum.
     pub(super) with: FamilyState,
 }
 
 impl Element {
-    /// The state of the node where it begins: before impulses.
+    /// The state of the node at which the element begins, before impulses.
     #[cfg(feature = "sparse")]
     pub(super) fn node(&self) -> &FamilyState {
         self.kicked
@@ -46,7 +46,7 @@ impl Element {
             .map_or(&self.before, |kicked| &kicked.before)
     }
 
-    /// Whether it ends where it did, now that it is solved once more; it was left at a tolerance.
+    /// Checks that the element, solved again, ends where it did, within the tolerance of the iteration.
     #[cfg(feature = "sparse")]
     pub(super) fn check(
         &self,
@@ -60,15 +60,16 @@ impl Element {
     }
 }
 
-/// Whether elements that are solved once more, from the first state, end in the second as they did, to many more digits than two roots of their equations have in common. The first one tells, too, of what
-/// roundings are a part: a motion may come to rest at the end, or pass its origin. Iterations may leave a tolerance of either.
+/// Whether an element or a motion that was solved again from `start` ends at `end` as before. The agreement asked for
+/// is far closer than that of two different solutions. Differences are relative to the larger one of start and end,
+/// since the motion may come to rest or pass the origin; both solutions may have the error of the tolerance.
 pub(super) fn is_same<const N: usize, L: Length<N>>(
     again: &L::State,
     (start, end): (&L::State, &L::State),
     tolerance: f64,
 ) -> bool {
     const SAME: f64 = 1e-9;
-    /// Of the tolerance: both are off by one, and it is that of a larger number beside them.
+    /// In tolerances: both solutions have an error, and the tolerance may be relative to a larger component.
     const LEFT: f64 = 4.0;
 
     let same = SAME.max(LEFT * tolerance);
@@ -83,22 +84,22 @@ pub(super) fn is_same<const N: usize, L: Length<N>>(
     near(again.0, start.0, end.0) && near(again.1, start.1, end.1)
 }
 
-/// The elements passed so far, and the recorded nodes.
+/// The elements so far, and the recorded nodes.
 #[derive(Default)]
 pub(super) struct Trail {
     pub(super) elements: Vec<Element>,
-    /// With how many elements there were before them; kept where they are asked for.
+    /// Nodes with the number of elements before them, if they are kept.
     pub(super) nodes: Vec<(usize, Node<0, RunTimeLength>)>,
     keeps_nodes: bool,
-    /// An event has ended an element.
+    /// Whether an event has ended an element.
     is_cut: bool,
-    /// The impulses of a model with constraints, and the state at the last node.
+    /// The impulses on a model with constraints, and the state at the last node.
     impulses: Vec<(f64, Vec<f64>)>,
     last: FamilyState,
 }
 
 impl Trail {
-    /// One that keeps recorded nodes.
+    /// A trail that keeps the recorded nodes.
     pub(super) fn with_nodes() -> Self {
         Self {
             keeps_nodes: true,
@@ -106,7 +107,7 @@ impl Trail {
         }
     }
 
-    /// The impulses at the node where an element begins.
+    /// The states around the impulses at the start of an element, if there are any.
     fn kicked(&mut self, passed: &Passed<'_, 0, RunTimeLength>) -> Option<Kicked> {
         let before = std::mem::replace(&mut self.last, passed.after.clone());
         let mut with = before.clone();
@@ -114,7 +115,7 @@ impl Trail {
         acting::kick(&self.impulses, at, &mut with.p).then_some(Kicked { before, with })
     }
 
-    /// Why a call has no derivatives of this motion: its elements are not those that are solved once more.
+    /// The error of a call for derivatives of this motion, if its elements cannot be solved again in the same way.
     fn refusal(
         &self,
         motion: &Motion<0, RunTimeLength>,
@@ -134,10 +135,10 @@ impl Trail {
 }
 
 impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
-    /// Runs over the span and leaves a trail, for a call that solves the elements once more.
+    /// Runs over the span and records the elements, for a call that solves them again.
     ///
     /// # Errors
-    /// Those of the run, and [`RunErrorKind::Unsupported`] where that call has no derivatives.
+    /// Those of the run, and [`RunErrorKind::Unsupported`] if the call has no derivatives of this motion.
     pub(super) fn trailed(
         &self,
         call: &'static str,

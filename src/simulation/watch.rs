@@ -1,4 +1,5 @@
-//! What a run notices about itself: steps at which the method grows, not the model.
+//! Warnings of a run about itself: steps in which the numerical solution grows but the motion does not, and jumps of
+//! the energy.
 
 use crate::evaluate::Evaluate;
 use crate::length::Length;
@@ -9,13 +10,13 @@ use tfe_runtime::{Element, Model, State};
 /// Looks at the elements of a run now and then.
 #[derive(Clone, Debug)]
 pub struct Watch {
-    /// None if it needs no watching.
+    /// `None` for an A-stable element, which needs no checks.
     element: Option<Element>,
     /// The number of the element that is examined next.
     next: usize,
-    /// The number of the one examined last.
+    /// The number of the element examined last.
     last: Option<usize>,
-    /// Whether that one was unstable: the next unstable one belongs to the same warning.
+    /// Whether that element was unstable; the next unstable one then belongs to the same warning.
     is_unstable: bool,
     energy: Energy,
     warnings: Vec<Warning>,
@@ -33,7 +34,8 @@ impl Watch {
         }
     }
 
-    /// Examines the element that begins at `t` in `state` if its number is 0, 1, 2, 4, 8, …; of a run that goes on, the first one, and those of twice its number and so forth.
+    /// Examines the element that begins at `t` in `state` if its number is 0, 1, 2, 4, 8, … A continued run examines
+    /// its first element, then those of 2, 4, … times its number.
     pub(super) fn look<M: Model<N>, const N: usize>(
         &mut self,
         model: &M,
@@ -47,7 +49,7 @@ impl Watch {
         }
     }
 
-    /// Examines the element in any case, as one that failed.
+    /// Examines an element regardless of its number, such as one that failed.
     pub(super) fn examine<M: Model<N>, const N: usize>(
         &mut self,
         model: &M,
@@ -56,7 +58,7 @@ impl Watch {
         state: &State<N>,
     ) {
         if const { !M::CONSTRAINTS.is_empty() } {
-            // Nothing is known of these from the state alone.
+            // For these the state alone does not determine the stability.
             return;
         }
         let Some(element) = self.element else { return };
@@ -93,7 +95,7 @@ impl Watch {
         });
     }
 
-    /// Looks at the energy of a recorded node, whose momentum has the product p·v with its velocity; `rounding` says what the energy may be rounded by.
+    /// Checks the energy of a recorded node; `rounding` returns the rounding error of the energy.
     pub(super) fn pass(&mut self, node: Recorded, rounding: &dyn Fn() -> f64) {
         let Recorded {
             time,
@@ -109,7 +111,7 @@ impl Watch {
             self.energy.last = None;
             return;
         }
-        // Twice the kinetic energy of velocities, half of it for Hamiltonians of any kind: no more than a scale.
+        // p·v is twice the kinetic energy of a Lagrangian. For other Hamiltonians half of it still serves as a scale.
         self.energy.scale = self.energy.scale.max(0.5 * action.abs());
         let last = self.energy.last.replace(energy);
         let (Some(before), true) = (last, is_conserved) else {
@@ -142,7 +144,7 @@ impl Watch {
         }
     }
 
-    /// One more, if there is one.
+    /// Adds a warning, if there is one.
     pub(super) fn add(&mut self, warning: Option<Warning>) {
         self.warnings.extend(warning);
     }
@@ -156,36 +158,37 @@ impl Watch {
     }
 }
 
-/// Whether an energy that is conserved differs by more than a tenth of a kinetic energy, and than roundings: of its value, and of what `more` says that each was computed with.
+/// Whether a conserved energy has changed by more than a tenth of a kinetic energy and by more than rounding error:
+/// that of its value, and the one that `more` returns for its computation.
 pub(crate) fn is_jump([before, after]: [f64; 2], kinetic: f64, more: &dyn Fn() -> f64) -> bool {
     let rounding = 1e-9 * after.abs().max(before.abs());
     let jump = (after - before).abs();
     jump > (0.1 * kinetic).max(rounding) && jump > 2.0 * more()
 }
 
-/// What the energy of the nodes has been.
+/// The energy of the nodes so far.
 #[derive(Clone, Debug, Default)]
 struct Energy {
     last: Option<f64>,
     /// The largest kinetic energy so far.
     scale: f64,
     is_lost: bool,
-    /// Which of the warnings is that of jumps.
+    /// The index of the warning about jumps.
     jump: Option<usize>,
 }
 
-/// What is looked at in a recorded node.
+/// The data of a recorded node that are checked.
 pub(super) struct Recorded {
     pub(super) time: f64,
     pub(super) energy: f64,
-    /// p·v
+    /// The product p·v.
     pub(super) action: f64,
-    /// Whether the energy has to be that of the node before.
+    /// Whether the energy must be that of the previous node.
     pub(super) is_conserved: bool,
 }
 
 impl Recorded {
-    /// Of a node whose energy is not known yet.
+    /// The data of a node whose energy is still to be computed.
     pub(super) fn of<M, L, const N: usize>(model: &M, node: &Node<N, L>, is_conserved: bool) -> Self
     where
         M: Evaluate<N, L>,
@@ -199,7 +202,7 @@ impl Recorded {
         }
     }
 
-    /// Of the last node of a motion.
+    /// The data of the last node of a motion.
     pub(super) fn last_of<L: Length<N>, const N: usize>(
         motion: &Motion<N, L>,
         is_conserved: bool,

@@ -1,4 +1,4 @@
-//! What is asked for: runs with an estimate of their error, or with an accuracy.
+//! The calls for runs with error estimates and for runs with a prescribed accuracy.
 
 use super::super::events::Severed;
 use super::super::follow::Follow;
@@ -118,7 +118,7 @@ where
         found.unwrap_or_else(|| Err(self.refused(RunErrorKind::panicked(span.start), at_start)))
     }
 
-    /// An error of a run that has not begun.
+    /// The error of a run that failed before its first element.
     pub(in crate::simulation) fn refused(
         &self,
         kind: RunErrorKind,
@@ -156,7 +156,7 @@ where
             check_accuracy(self.accuracy).map_err(|kind| run.refused(kind, at_start))?;
             let motion = run.run(start, span)?;
             let outputs = run.outputs();
-            // Of coordinates, of momenta and of each output none.
+            // Empty lists of errors: for the coordinates, the momenta and each output.
             let errors = vec![Vec::new(); 2 + outputs.len()];
             return Ok(Estimated::new(motion, Vec::new(), errors, outputs, None));
         }
@@ -164,7 +164,7 @@ where
         found.unwrap_or_else(|| Err(run.refused(RunErrorKind::panicked(span.start), at_start)))
     }
 
-    /// The same of a span that takes a time.
+    /// The search on a span of nonzero length.
     fn find(
         &self,
         run: &Simulation<'_, M, N, L>,
@@ -177,7 +177,7 @@ where
         let asked = Asked {
             accuracy: self.accuracy,
             span: span.clone(),
-            // An impulse inside an element costs it its order.
+            // An impulse inside an element reduces the order, so elements end there.
             breaks: with_times(&run.breaks, &run.impulses, M::time_of),
             element: run.element,
             longest: run.step,
@@ -187,7 +187,7 @@ where
             in_pairs: M::IS_CONSTRAINED && !run.has_events() && !run.crosses_kinks(),
         };
         let mut facts = M::FACTS;
-        // Equations of first order, written as p·f(q), conserve nothing that short and long steps could spoil.
+        // First-order equations, written as p·f(q), have no structure that unequal steps would spoil.
         facts.forced |= !facts.linear && run.model.is_of_first_order(span.start, start);
         let are_equal = self.equal_steps || run.has_events();
         let steps = Steps::of(&facts, are_equal, M::IS_CONSTRAINED);
@@ -208,7 +208,7 @@ where
         if let Some(longest) = run.step {
             check_span(span, longest)?;
         }
-        // Of span, breaks and impulses.
+        // Errors of the span, the breaks and the impulses.
         let h = (span.end - span.start) / 1000.0;
         let grid = Grid {
             step: Some(h),
@@ -288,7 +288,7 @@ where
         self.model.kick(&self.impulses, (t, h), state);
         let impulses = mesh.impulses_in(t, next, mesh.end() == Some(next));
         let element = (mesh.begin(t, h), h);
-        // Of a panic the motion that is recorded tells, which is the first.
+        // A panic is reported by the recorded run, which meets it first.
         let advanced = (self.model).guarded(|| M::advance(stepper, element, state, impulses));
         advanced.unwrap_or(Err(StepError::NonFinite))
     }
@@ -360,7 +360,7 @@ where
         if self.crosses_kinks() {
             motion.add_warning(Warning::KinksCrossed);
         }
-        // A run that an event has stopped stays where it is, with the parameters that it had there.
+        // After an event has stopped the run, its state and parameters are kept to the end of the span.
         let Compared {
             model,
             acts,
@@ -437,18 +437,18 @@ where
     }
 }
 
-/// Breaks, and the times of impulses.
+/// The times of the breaks and of the impulses.
 fn with_times<K>(breaks: &[f64], impulses: &[K], time: fn(&K) -> f64) -> Vec<f64> {
     let times = impulses.iter().map(time);
     breaks.iter().copied().chain(times).collect()
 }
 
-/// Shows what a run is compared by.
+/// The follower that reports the end of each element to a comparison of runs.
 struct Compared<'a, 'p, 'm, M, T, S> {
     passed: &'a mut Passing<'p, M, T, S>,
-    /// As events have left it.
+    /// The model with the parameters set by events so far.
     model: Share<'m, M>,
-    /// Events that have cut elements.
+    /// The number of events that have cut an element so far.
     acts: usize,
     last: f64,
     goes_on: ControlFlow<()>,

@@ -1,4 +1,4 @@
-//! Which steps a run may have, and where they have to be short.
+//! Equal or graded steps: which a run may use, and the pilot run that finds where steps must be short.
 
 use super::pilots;
 use super::repeatable::Repeatable;
@@ -7,7 +7,7 @@ use crate::accuracy::{
 };
 use tfe_runtime::{Element, Facts, Statistics};
 
-/// Given nodes as a grading, with the factor 1 the nodes themselves.
+/// The grading that consists of given nodes; the factor 1 reproduces them.
 pub(super) fn graded_by(nodes: &[f64], element: Element) -> Option<Graded> {
     let lengths = nodes.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     Some(Graded {
@@ -17,9 +17,11 @@ pub(super) fn graded_by(nodes: &[f64], element: Element) -> Option<Graded> {
     })
 }
 
-/// Where steps have to be short, by a pilot run that begins with the step `first`; `None` where equal steps are as good.
+/// Finds by a pilot run, whose first step is `first`, where steps must be short; `None` where equal steps are as good.
 ///
-/// Elements that damp what is fast, or those of Gauss points where nothing is: where the fixed point contracted in nearly all steps.
+/// Unless the element was chosen, it is one with numerical damping if `damps`, except where the motion is not stiff:
+/// where the fixed-point iteration converged in nearly all steps of the pilot run, an element with Gauss points is
+/// used.
 pub(super) fn graded<R: Repeatable<N>, const N: usize>(
     run: &R,
     start: &R::State,
@@ -28,9 +30,10 @@ pub(super) fn graded<R: Repeatable<N>, const N: usize>(
     first: f64,
     work: &mut Statistics,
 ) -> Option<Graded> {
-    /// The part of steps that Newton's method may have made.
+    /// The largest fraction of steps solved by Newton's method for which a motion counts as not stiff.
     const FEW: f64 = 0.1;
-    /// What a step may be off by: with less of it the pilot run is longer than those that follow, with more it may step over what is fast.
+    /// The local error of the pilot run. A smaller one makes the pilot run longer than the runs that follow; with a
+    /// larger one it may step over fast phases.
     const LOCAL: f64 = 1e-7;
     let smooth = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
     let element = match asked.element {
@@ -64,18 +67,19 @@ pub(super) fn graded<R: Repeatable<N>, const N: usize>(
     })
 }
 
-/// Which steps a run may have.
+/// The kinds of steps that a run may use.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Steps {
     Equal,
-    /// Short ones where the motion is fast, where that pays; with elements that damp, if the model runs with them.
+    /// Short steps where the motion is fast, if that saves work; `damps` permits elements with numerical damping.
     Varying {
         damps: bool,
     },
 }
 
 impl Steps {
-    /// Equal ones keep the structure of models that are conservative and do not depend on time, and step linear ones by a matrix.
+    /// Equal steps preserve the structure of conservative autonomous models, and allow linear models to reuse one
+    /// matrix for all steps.
     pub(super) fn of(facts: &Facts, are_equal: bool, is_constrained: bool) -> Self {
         let may_vary = facts.time_dependent || (facts.forced && !facts.linear);
         if may_vary && !are_equal {

@@ -1,4 +1,4 @@
-//! Two elements over the same steps, for a pilot run.
+//! The pilot run: two elements of successive orders over the same steps, whose difference estimates the local error.
 
 use super::super::mesh::Mesh;
 use super::super::times::up_to_break;
@@ -8,16 +8,16 @@ use crate::accuracy::{Course, Pair, Trace, next};
 use crate::error::RunErrorKind;
 use tfe_runtime::{Element, Statistics, StepError};
 
-/// What iterations may leave of what a step may be off by, so that it does not show in differences that count.
+/// The tolerance of the iterations relative to the local error, so that iteration errors do not affect the estimate.
 const TOLERANCE: f64 = 1e-3;
 
-/// An element and one of the next order, both from the state that the latter has reached: it goes on from where its own last step has ended.
+/// An element and one of the next order. Both start each step from the state that the second has reached.
 pub(super) struct Pilots<'r, R: Repeatable<N>, const N: usize> {
     run: &'r R,
-    /// The one whose errors are asked for, and the one of higher order.
+    /// The stepper whose error is estimated, and the one of higher order.
     steppers: [R::Stepper; 2],
     state: R::State,
-    /// Where both have ended, and that as numbers.
+    /// The states that both have reached, and these states as rows of numbers.
     ends: [R::State; 2],
     rows: [Vec<f64>; 2],
     trace: Trace,
@@ -26,10 +26,10 @@ pub(super) struct Pilots<'r, R: Repeatable<N>, const N: usize> {
     mesh: Mesh<N>,
     breaks: Vec<f64>,
     end: f64,
-    /// Newton iterations of the last attempt, and steps that were kept: with some of them and all.
+    /// The Newton iterations of the last attempt; then the number of accepted steps with Newton iterations, and of all.
     newton: u64,
     kept: (usize, usize),
-    /// The last attempt failed because the motion slides along a jump.
+    /// Whether the last attempt failed because the motion slides along a jump of the force.
     slides: bool,
 }
 
@@ -74,14 +74,14 @@ impl<'r, R: Repeatable<N>, const N: usize> Pilots<'r, R, N> {
         Ok(pair)
     }
 
-    /// What both have cost.
+    /// The work of both steppers.
     pub(super) fn work(&self) -> Statistics {
         let [mut work, other] = self.steppers.each_ref().map(R::statistics);
         work.merge(&other);
         work
     }
 
-    /// The part of steps that were made by Newton's method.
+    /// The fraction of accepted steps that used Newton's method.
     pub(super) fn by_newton(&self) -> f64 {
         self.kept.0 as f64 / self.kept.1.max(1) as f64
     }
@@ -91,7 +91,7 @@ impl<R: Repeatable<N>, const N: usize> Pair for Pilots<'_, R, N> {
     fn attempt(&mut self, t: f64, h: f64) -> bool {
         let reached = t + h;
         let is_reached = |time: &&f64| (*time - reached).abs() <= 4.0 * f64::EPSILON * time.abs();
-        // The end of the span to the bit, where an impulse may act.
+        // The end of the span is hit to the bit, since an impulse may act there.
         let (next, h) = match self.breaks.iter().find(is_reached) {
             Some(time) => (*time, up_to_break(t, *time)),
             None if is_reached(&&self.end) => (self.end, self.end - t),

@@ -1,20 +1,21 @@
-//! Where runs with shorter and shorter steps stop, and whether the motion goes on from there.
+//! Detects a time that runs cannot pass with any step size, such as a singularity of the motion.
 
 use super::repeatable::{Repeatable, trusting};
 use crate::accuracy::{Trace, Way};
 use crate::error::RunErrorKind;
 use crate::simulation::mesh::Mesh;
 
-/// Where runs with shorter and shorter steps stop.
+/// The time at which successive runs with decreasing step size have failed.
 #[derive(Debug, Default)]
 pub(super) struct Place {
     last: Option<(f64, f64)>,
-    /// How many runs in succession have stopped there.
+    /// The number of successive runs that failed there.
     times: u32,
 }
 
 impl Place {
-    /// How many runs in succession have stopped within a step or two of the same time, this one included; none where that is the start's.
+    /// Counts the successive runs that failed within two steps of the same time, including this one. A failure at the
+    /// start of the span always counts as the first.
     fn meet(&mut self, start: f64, kind: &RunErrorKind) -> u32 {
         let &RunErrorKind::Solve { time, step, .. } = kind else {
             return 0;
@@ -28,7 +29,8 @@ impl Place {
         self.times
     }
 
-    /// Whether steps of any length stop there: runs have done so again and again, and the motion does not go on.
+    /// Whether no step size leads past the time of failure: several runs have failed there, and trial steps do not get
+    /// beyond it.
     pub(super) fn is_an_end<R: Repeatable<N>, const N: usize>(
         &mut self,
         run: &R,
@@ -36,7 +38,8 @@ impl Place {
         (way, mesh): (&Way<'_>, &Mesh<N>),
         stopped: (&RunErrorKind, &R::State),
     ) -> bool {
-        /// How many runs are enough to look beyond, and from when on steps are so much shorter that two lengths of them have to tell the same motion.
+        /// The number of failures after which trial steps are made, and the number after which two step sizes must also
+        /// agree on the motion beyond.
         const OFTEN: [u32; 2] = [3, 8];
         let times = self.meet(start, stopped.0);
         let [often, very_often] = OFTEN;
@@ -44,10 +47,10 @@ impl Place {
     }
 }
 
-/// Whether the motion goes on beyond a time at which a run has stopped, with steps that are as short as they have to be.
+/// Whether the motion continues beyond the time at which a run failed, when steps are halved as often as needed.
 ///
-/// It does not where it ends in a singular point. Nor does it where steps get across one by chance, if that is looked at: two runs with steps of different lengths are at different
-/// places then.
+/// It does not if it ends in a singularity. With `compares`, it does not either if steps get across a singularity only
+/// by chance: two runs with different step sizes then reach different states.
 fn is_passed<R: Repeatable<N>, const N: usize>(
     run: &R,
     way: &Way<'_>,
@@ -56,7 +59,7 @@ fn is_passed<R: Repeatable<N>, const N: usize>(
     compares: bool,
 ) -> bool {
     const OTHER: f64 = 0.618;
-    /// Two runs that are farther apart, relative to the largest number of their kind, do not tell the same motion.
+    /// The largest difference, relative to the largest number of the same kind, of two runs that agree.
     const SAME: f64 = 0.1;
     let &RunErrorKind::Solve { time, step, .. } = kind else {
         return true;
@@ -88,15 +91,15 @@ fn is_passed<R: Repeatable<N>, const N: usize>(
     kinds.all(|(apart, size)| *apart <= SAME * size)
 }
 
-/// What there is beyond a time at which a run has stopped.
+/// The outcome of trial steps beyond a time at which a run has failed.
 enum Beyond<S> {
     Reached(f64, S),
     Stopped,
-    /// Steps have become many and not so short that they could get no shorter.
+    /// The limit on the number of steps was reached before the steps became too short for the resolution of time.
     Unknown,
 }
 
-/// Some steps of a run from a time on, cut as often as they have to be, the first one of the length `first`.
+/// Makes steps from `time` on, the first of length `first`, each shortened as often as it fails.
 fn beyond<R: Repeatable<N>, const N: usize>(
     run: &R,
     stepper: &mut R::Stepper,
@@ -104,10 +107,10 @@ fn beyond<R: Repeatable<N>, const N: usize>(
     (time, step, first): (f64, f64, f64),
     state: &R::State,
 ) -> Beyond<R::State> {
-    /// How far, in steps of the run.
+    /// The length of the trial, in steps of the failed run.
     const FAR: f64 = 4.0;
     const MOST: u32 = 2000;
-    /// Sums of steps may be off by roundings, which are no steps of their own.
+    /// A remainder shorter than this relative amount of a step is rounding error, and gets no step of its own.
     const ROUNDINGS: f64 = 1.0 - 1e-9;
     let end = time + FAR * step;
     let (mut t, mut h, mut state) = (time, first, state.clone());

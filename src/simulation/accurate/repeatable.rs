@@ -1,4 +1,4 @@
-//! What a search asks of a run.
+//! The interface between the search for an accuracy and the runs that it makes.
 
 use crate::error::RunErrorKind;
 use crate::simulation::mesh::Mesh;
@@ -7,13 +7,13 @@ use tfe_runtime::constrained::Trail;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Solve, Statistics, StepError};
 
-/// A place of a run.
+/// The situation at a time of a run.
 pub(crate) struct At<'a, M, S> {
-    /// With the parameters that hold there.
+    /// The model with its parameters at this time.
     pub(crate) model: &'a M,
     pub(crate) t: f64,
     pub(crate) state: &'a S,
-    /// How many events have changed the motion so far.
+    /// The number of events so far that have changed the motion.
     pub(crate) acts: usize,
 }
 
@@ -24,24 +24,24 @@ pub(crate) trait Repeatable<const N: usize> {
     type Stepper;
     type Motion;
 
-    /// The element; the default one where none was chosen.
+    /// The element; the default if none was chosen.
     fn element(&self) -> Element;
     fn control(&self) -> Control;
     /// Whether progress is to be shown.
     fn progress(&self) -> bool;
     fn coordinates(&self) -> usize;
-    /// How many outputs there are.
+    /// The number of outputs.
     fn columns(&self) -> usize;
     /// The names of all outputs.
     fn outputs(&self) -> Vec<String>;
-    /// A stepper; the inside of its steps is asked for only if they are to be recorded.
+    /// Creates a stepper; `true` if the polynomials inside its elements will be recorded.
     fn stepper(
         &self,
         element: Element,
         control: Control,
         is_recorded: bool,
     ) -> Result<Self::Stepper, RunErrorKind>;
-    /// One element of the mesh: its start, end and length.
+    /// Solves one element of the mesh, given by its start, end and length.
     fn advance(
         &self,
         stepper: &mut Self::Stepper,
@@ -49,19 +49,19 @@ pub(crate) trait Repeatable<const N: usize> {
         mesh: &Mesh<N>,
         state: &mut Self::State,
     ) -> Result<(), StepError>;
-    /// Adds the last element of a stepper to a trail, where that is of use.
+    /// Appends the last element of a stepper to a trail, if the kind of model uses trails as first guesses.
     fn leave(stepper: &Self::Stepper, trail: &mut Trail);
-    /// Has an element of a stepper, its start and length, start from what a trail says.
+    /// Takes the first guess for the next element, given by its start and length, from a trail.
     fn foresee(stepper: &mut Self::Stepper, trail: &Trail, step: (f64, f64));
-    /// Why an element could not be solved.
+    /// The error of a run whose element could not be solved.
     fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind;
     fn set_tolerance(stepper: &mut Self::Stepper, tolerance: f64);
     fn statistics(stepper: &Self::Stepper) -> Statistics;
-    /// The same since the last call.
+    /// The work of a stepper since the last call.
     fn take_statistics(stepper: &mut Self::Stepper) -> Statistics;
-    /// The model as it was given.
+    /// The model as it was given, before any event.
     fn model(&self) -> &Self::Model;
-    /// A place before which no event has changed anything.
+    /// The situation at a time before any event.
     fn at<'a>(&'a self, t: f64, state: &'a Self::State) -> At<'a, Self::Model, Self::State> {
         At {
             model: self.model(),
@@ -70,14 +70,14 @@ pub(crate) trait Repeatable<const N: usize> {
             acts: 0,
         }
     }
-    /// Coordinates, momenta and outputs, one after the other. The stepper has the model of the place.
+    /// Writes coordinates, momenta and outputs into one row. The model is that of `at`, as in the stepper.
     fn row(
         &self,
         stepper: &mut Self::Stepper,
         at: &At<'_, Self::Model, Self::State>,
         row: &mut [f64],
     );
-    /// The steps of a mesh as motion; every end of an element is shown to `passed`.
+    /// Runs over a mesh and returns the motion; calls `passed` at the end of every element.
     fn record(
         &self,
         stepper: &mut Self::Stepper,
@@ -85,28 +85,29 @@ pub(crate) trait Repeatable<const N: usize> {
         start: (f64, &Self::State),
         passed: &mut Passing<'_, Self::Model, Self::Stepper, Self::State>,
     ) -> Result<Self::Motion, Broken<Self::Motion>>;
-    /// Whether the run looks for events, so that elements alone do not make it.
+    /// Whether the run looks for events, which may cut elements.
     fn has_events(&self) -> bool;
-    /// Whether steps go across kinks or jumps of forces, so that errors need not fall with the order of the element.
+    /// Whether steps may contain kinks or jumps of the force, so that the error may not fall with the order of the
+    /// element.
     fn crosses_kinks(&self) -> bool;
-    /// A motion of the start and one other state.
+    /// A motion of only two states, for a run that failed.
     fn part(&self, start: (f64, &Self::State), end: (f64, &Self::State)) -> Self::Motion;
-    /// A mesh of equal parts between times.
+    /// A mesh of equal steps between given times.
     fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind>;
     /// A mesh of given nodes.
     fn through(&self, nodes: &[f64]) -> Result<Mesh<N>, RunErrorKind>;
-    /// The nodes that were given.
+    /// The nodes that the caller gave.
     fn nodes(&self) -> Option<&[f64]>;
 }
 
-/// Is shown the end of every element, with the stepper. Says whether the run goes on.
+/// Called at the end of every element with the stepper; the result says whether the run continues.
 pub(crate) type Passing<'a, M, T, S> = dyn FnMut(&mut T, &At<'_, M, S>) -> ControlFlow<()> + 'a;
 
-/// Why a recorded run has stopped, and what there is of it.
+/// The error of a recorded run, with the motion up to there.
 pub(crate) type Broken<T> = Box<(RunErrorKind, T)>;
 
-/// Runs that are compared with better ones need no other evidence: a step with another root is told by the comparison, and one that was cut on one side alone would
-/// spoil it.
+/// Turns off the checks of single steps: runs that are compared with more accurate ones need no other evidence. The
+/// comparison detects a step with a wrong root, and a step cut in only one of the two runs would spoil it.
 pub(super) fn trusting(control: Control) -> Control {
     let solve = match control.solve {
         Solve::Auto => Solve::Trusting,

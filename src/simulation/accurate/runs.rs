@@ -1,4 +1,4 @@
-//! Makes the runs that a search asks for.
+//! Makes the runs of a search for an accuracy, and keeps their steppers and their results.
 
 use super::place::Place;
 use super::repeatable::{Passing, Repeatable};
@@ -11,10 +11,10 @@ use std::ops::ControlFlow;
 use tfe_runtime::constrained::Trail;
 use tfe_runtime::{Element, Solve, Statistics};
 
-/// An iteration that takes more is no bargain.
+/// The largest number of fixed-point iterations a step; with more, Newton's method is cheaper.
 pub(super) const MOST_ITERATIONS: u32 = 25;
 
-/// What there is of the motion: the last one that was recorded; as long as there is none, the state that went farthest.
+/// The best result so far: the last recorded motion, or, before there is one, the state that reached farthest.
 pub(super) enum Kept<T, S> {
     Nothing,
     Part(f64, S),
@@ -38,16 +38,16 @@ impl<T, S> Kept<T, S> {
 pub(super) struct Runs<'a, R: Repeatable<N>, const N: usize> {
     run: &'a R,
     start: (f64, &'a R::State),
-    /// The last ones.
+    /// The steppers used last, the most recent first.
     steppers: Vec<Reusable<R::Stepper>>,
     place: Place,
-    /// What the better run of the last pair has found.
+    /// The stage values that the more accurate run of the last pair has found, as first guesses.
     trail: Trail,
     kept: &'a mut Kept<R::Motion, R::State>,
     work: &'a mut Statistics,
 }
 
-/// A stepper, and what it is for.
+/// A stepper with the settings for which it can be used again.
 struct Reusable<T> {
     by_iteration: bool,
     element: Element,
@@ -55,10 +55,10 @@ struct Reusable<T> {
 }
 
 impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
-    /// How many steppers are kept: of two elements.
+    /// The number of steppers that are kept: those of two elements.
     const MOST_STEPPERS: usize = 2;
 
-    /// Makes runs from a start, and has what there is of the motion and what all of them cost kept.
+    /// Prepares runs from a start; `kept` receives the best result, and `work` the work of all runs.
     pub(super) fn new(
         run: &'a R,
         start: (f64, &'a R::State),
@@ -96,7 +96,7 @@ impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
         })
     }
 
-    /// Counts what a stepper has done, and keeps it for the next run. What it has done in this one is returned.
+    /// Adds the work of a stepper to the total, keeps the stepper for the next run, and returns its work in this run.
     fn keep_stepper(&mut self, mut reusable: Reusable<R::Stepper>) -> Statistics {
         let taken = R::take_statistics(&mut reusable.stepper);
         self.work.merge(&taken);
@@ -112,7 +112,7 @@ impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
         }
     }
 
-    /// A run that may be the motion that is asked for.
+    /// Makes a run whose motion may be the result of the search.
     fn record(
         &mut self,
         stepper: &mut R::Stepper,
@@ -194,7 +194,8 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
             Watcher::new(run, &mut second.stepper, self.start),
         ];
         let mut elements = mesh.elements().enumerate().peekable();
-        // What the last pair has found, this one has, and its lower element has in this step.
+        // First guesses: the first stepper takes them from the more accurate run of the last pair, the second from the
+        // first stepper in the same step.
         let before = mem::take(&mut self.trail);
         let (mut trail, mut here) = (Trail::new(), Trail::new());
         let mut state = start.clone();
@@ -204,7 +205,7 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
         let (mut apart, mut sizes) = (Vec::new(), Vec::new());
         let passed = self.record(&mut first.stepper, &mesh, &mut |stepper, at| {
             let [one, other] = &mut watchers;
-            // The other one makes the same step.
+            // The second stepper makes the same step.
             let Some((element, (from, next, h))) = elements.next() else {
                 return ControlFlow::Continue(());
             };
@@ -222,7 +223,7 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
             }
             times.push(at.t);
             one.pass(run, stepper, at, true);
-            // Runs with events, which may set parameters, are not made side by side.
+            // Pairs are not used for runs with events, so the parameters are those of the given model.
             other.pass(run, &mut second.stepper, &run.at(at.t, &state), true);
             other.trace.apart(&one.row, &other.row, &mut apart);
             other.trace.sizes_with(&one.row, &mut sizes);
@@ -233,7 +234,7 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
             });
             goes_on
         });
-        // An earlier pair may have gone farther.
+        // The trail of an earlier pair is kept if it reaches farther.
         let reach = |trail: &Trail| trail.end().map_or(0.0, |end| (end - t0).abs());
         self.trail = if reach(&trail) > reach(&before) {
             trail

@@ -1,4 +1,4 @@
-//! What runs are compared by.
+//! Records the numbers by which runs are compared.
 
 use super::repeatable::{At, Repeatable};
 use crate::accuracy::Trace;
@@ -7,15 +7,15 @@ use crate::simulation::mesh::Mesh;
 use crate::simulation::progress::Bar;
 use std::ops::ControlFlow;
 
-/// What is seen of a run.
+/// The recorded numbers of a run.
 pub(super) struct Watcher {
     pub(super) trace: Trace,
-    /// Room for one time.
+    /// Buffer for one row.
     pub(super) row: Vec<f64>,
 }
 
 impl Watcher {
-    /// One that has seen the start.
+    /// Creates a watcher that has recorded the start.
     pub(super) fn new<R: Repeatable<N>, const N: usize>(
         run: &R,
         stepper: &mut R::Stepper,
@@ -42,10 +42,10 @@ impl Watcher {
     }
 }
 
-/// Why a run has stopped, and where.
+/// Why, when and in which state a run has failed.
 pub(super) type Stop<S> = (RunErrorKind, f64, S);
 
-/// A run of which nothing is kept but what it is compared by, at `times`.
+/// Runs over a mesh and keeps only the rows at `times`.
 pub(super) fn follow<R: Repeatable<N>, const N: usize>(
     run: &R,
     stepper: &mut R::Stepper,

@@ -65,7 +65,7 @@ pub struct Occurrence<'a, const N: usize, L: Length<N> = FixedLength> {
     model: &'a dyn Knows<N, L>,
 }
 
-/// What an event can be asked about its model.
+/// The access of an event to its model, without the type of the model.
 trait Knows<const N: usize, L: Length<N>> {
     fn momenta(&self, v: &L::Vector) -> L::Vector;
     fn after_impact(&self, restitution: f64) -> L::State;
@@ -146,11 +146,11 @@ impl<const N: usize, L: Length<N>> fmt::Debug for Occurrence<'_, N, L> {
 type Action<'m, const N: usize, L> =
     Arc<dyn Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm>;
 
-/// What a run is to look for.
+/// An event to be watched: its function, its direction and its action.
 #[derive(Clone)]
 pub(in crate::simulation) struct On<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(in crate::simulation) name: String,
-    /// None for an output of this name.
+    /// `None` for the output with this name.
     pub(in crate::simulation) function: Option<Function<'m, L::Vector>>,
     pub(in crate::simulation) crossing: Crossing,
     pub(in crate::simulation) act: Action<'m, N, L>,
@@ -162,14 +162,14 @@ impl<const N: usize, L: Length<N>> fmt::Debug for On<'_, N, L> {
     }
 }
 
-/// An event with its model.
+/// An event together with its model.
 struct Knowing<'a, 'm, M, const N: usize, L: Length<N>> {
     model: &'a M,
     event: &'a Event<N, L>,
     value: &'a Value<'m, L::Vector>,
-    /// A parameter that the model cannot have another value of, and by how much it is larger.
+    /// A parameter and an increment, for a parameter that cannot be changed in the model itself.
     larger: Option<(usize, f64)>,
-    /// How fast the surface was met, where the state after an impact on it was asked for; else zero.
+    /// The speed at which the surface was hit, if the state after an impact was asked for; otherwise zero.
     impact: Cell<f64>,
 }
 
@@ -208,9 +208,10 @@ where
             self.model.allowed_velocity(*t, &state, v)
         };
         let aim = -restitution * rate(v);
-        // Linear in λ where the kinetic energy is quadratic: the second secant is then the last one that changes anything but roundings.
+        // The equation is linear in λ if the kinetic energy is quadratic; then the second secant step solves it up to
+        // rounding error.
         const MAX_SECANTS: u32 = 20;
-        // Of the size that an energy ½ v·p has.
+        // The size of λ at which the impulse is as large as the momentum.
         let size = |values: &L::Vector| {
             let values = values.as_ref().iter();
             values.fold(0.0_f64, |m, x| m.max(x.abs()))
@@ -229,7 +230,7 @@ where
             }
             let slope = (here.1 - before.1) / (here.0 - before.0);
             let change = -here.1 / slope;
-            // Roundings have no slope.
+            // The last two values differ by rounding only.
             if here.1 == 0.0
                 || !change.is_finite()
                 || change.abs() <= 2.0 * f64::EPSILON * next.abs()
@@ -239,7 +240,7 @@ where
             steepest = steepest.max(slope.abs());
             (before, next) = (here, next + change);
         }
-        // What roundings of the momenta leave.
+        // The rounding error that the momenta cause.
         let roundings = 16.0 * f64::EPSILON * steepest * first;
         let Some(after) = after.filter(|_| least <= 1e-9 * rate(v).abs() + roundings) else {
             return unknown();
@@ -258,17 +259,17 @@ where
     }
 }
 
-/// A place near an event, and a parameter that is a little larger there.
+/// A perturbed event, for difference quotients.
 pub(in crate::simulation) struct Near<const N: usize> {
     pub(in crate::simulation) t: f64,
     pub(in crate::simulation) state: State<N>,
-    /// What the parameter adds to the velocity.
+    /// The change of the velocity due to the parameter.
     pub(in crate::simulation) velocity: [f64; N],
-    /// The parameter, among all, and by how much it is larger.
+    /// The index of the parameter and its increment.
     pub(in crate::simulation) parameter: Option<(usize, f64)>,
 }
 
-/// What an act makes of a state near that of its event; none where it lets the run end or go on as it was.
+/// The state that an action makes of the state at a perturbed event; `None` if the action only records or stops.
 pub(in crate::simulation) fn state_after<M: Model<N>, const N: usize>(
     model: &M,
     (on, value): (&On<'_, N>, &Value<'_, [f64; N]>),
@@ -316,7 +317,8 @@ pub(in crate::simulation) fn state_after<M: Model<N>, const N: usize>(
     }
 }
 
-/// What is to be done at an event, and how fast its surface was met, where that is an impact; else zero.
+/// Calls the action of an event. Also returns the speed at which the surface was hit if the state after an impact was
+/// asked for, otherwise zero.
 pub(super) fn act<M, L, const N: usize>(
     model: &M,
     (on, value): (&On<'_, N, L>, &Value<'_, L::Vector>),
@@ -344,14 +346,14 @@ where
     (act, impact)
 }
 
-/// With what a run goes on after an event.
+/// The state and the model with which a run continues after an event.
 pub(in crate::simulation) struct After<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     pub(in crate::simulation) state: L::State,
-    /// The model with other parameters, if any were set, and these by their numbers.
+    /// The model with changed parameters, and these parameters by their indices; `None` if none was set.
     pub(in crate::simulation) model: Option<Changed<'m, M>>,
 }
 
-/// What an act lets a run go on with; none where it ends.
+/// The state and the model after an action; `None` if the run ends.
 pub(super) fn after<'m, M, L, const N: usize>(
     model: &M,
     remodel: Option<Remodel<'m, M>>,
@@ -378,7 +380,7 @@ where
     Ok(Some(After { state, model: None }))
 }
 
-/// The state with momenta that are larger by an impulse, as far as constraints let it act.
+/// The state after an impulse; constraints react to the part of it that violates them.
 fn kicked<M, L, const N: usize>(
     model: &M,
     t: f64,
@@ -392,7 +394,7 @@ where
     let (q, p) = L::parts(state);
     let more = impulse.as_ref();
     if more.len() != p.as_ref().len() {
-        // Told as a state that is not finite.
+        // Reported as a state that is not finite.
         return L::state(q.clone(), L::unknown(p));
     }
     let p = L::from_fn(p, |a| p.as_ref()[a] + more[a]);

@@ -1,27 +1,28 @@
-//! Boxes in time and phase space in which nothing that is watched vanishes: motions stay in one for some steps (T-155).
+//! Skips the search for events where none can be: a box in time and phase space in which no watched function vanishes
+//! covers several steps (T-155).
 
 use tfe_runtime::enclosure::Enclosure;
 
-/// Writes bounds of coordinates and velocities along a step, if it can.
+/// Writes bounds of coordinates and velocities over a step; returns false if there are none.
 type Reach<'a> = dyn FnMut(&mut Vec<(f64, f64)>) -> bool + 'a;
 
-/// Writes the sides of what is watched over a box, if it can.
+/// Writes the signs of the watched functions over a box; returns false if there are no bounds.
 type Outputs<'a> = dyn FnMut(&[Enclosure], &mut Vec<f64>) -> bool + 'a;
 
-/// Such a box, if one is known.
+/// A box in which no watched function vanishes, if one is known.
 #[derive(Debug)]
 pub(super) struct Clear {
-    /// The time, coordinates, velocities (momenta); nothing where none is known.
+    /// The bounds of time, coordinates and velocities (or momenta); empty if no box is known.
     bounds: Vec<(f64, f64)>,
-    /// On which sides of zero all outputs are in it that are watched.
+    /// The signs of the watched functions in the box.
     sides: Vec<f64>,
-    /// How many times as wide the next one is as what a step has reached.
+    /// The size of the next box relative to the range of a step.
     growth: f64,
-    /// The most that it may be.
+    /// The largest such size that is tried.
     most: f64,
-    /// Steps that are to pass before one is looked for.
+    /// The number of steps before the next attempt.
     wait: u32,
-    /// What the last step has reached.
+    /// The range of the last step.
     reached: Vec<(f64, f64)>,
     enclosures: Vec<Enclosure>,
 }
@@ -43,17 +44,17 @@ impl Default for Clear {
 impl Clear {
     const FIRST: f64 = 8.0;
     const MOST: f64 = 128.0;
-    /// By how much what is not tried grows with every box.
+    /// The factor by which the largest size recovers with each box.
     const RECOVERY: f64 = 1.05;
-    /// Steps that pass after a box as wide as one of them was not clear.
+    /// The number of steps without an attempt after not even the range of one step was free of zeros.
     const PATIENCE: u32 = 8;
 
-    /// None is known of another model.
+    /// Discards the box, since the model has changed.
     pub(super) fn forget(&mut self) {
         self.bounds.clear();
     }
 
-    /// Whether a step from t on, h long, stays where nothing vanishes: in the box that is known as `within` says of coordinates and velocities.
+    /// Whether the step from t to t + h stays inside the known box; `within` compares coordinates and velocities.
     #[inline(always)]
     pub(super) fn holds(
         &self,
@@ -66,7 +67,8 @@ impl Clear {
         *low <= t.min(t + h) && t.max(t + h) <= *high && within(rest)
     }
 
-    /// Looks for a box about that step; `reach` writes the bounds of coordinates and velocities along it, if it can, `outputs` the sides of what is watched over a box.
+    /// Tries to find a box around the step. `reach` writes the bounds of coordinates and velocities over the step,
+    /// `outputs` the signs of the watched functions over a box.
     #[cold]
     pub(super) fn look(
         &mut self,
@@ -89,7 +91,7 @@ impl Clear {
                 self.wait = Self::PATIENCE;
                 return false;
             }
-            // What was too wide is not tried again soon.
+            // Sizes that failed are not tried again soon.
             self.most = 0.5 * self.growth;
             self.growth = (0.25 * self.growth).max(1.0);
         }
@@ -98,7 +100,7 @@ impl Clear {
         true
     }
 
-    /// Whether the box is clear that is so many times as wide as what the step has reached.
+    /// Whether no watched function vanishes in a box of the size `growth` relative to the range of the step.
     fn try_growth(&mut self, h: f64, outputs: &mut Outputs<'_>) -> bool {
         let more = 0.5 * (self.growth - 1.0);
         self.bounds.clear();
@@ -106,7 +108,7 @@ impl Clear {
             let more = more * (high - low);
             self.bounds.push((low - more, high + more));
         }
-        // The time goes one way.
+        // Time grows in one direction only.
         let (ahead, (low, high)) = (self.growth * h, self.reached[0]);
         self.bounds[0] = (low.min(low + ahead), high.max(high + ahead));
         self.enclosures.clear();
@@ -120,7 +122,7 @@ impl Clear {
         false
     }
 
-    /// Whether no side is known to be another one; those that were not known are known then.
+    /// Whether the signs in the box agree with those already known. Signs that were unknown are then known.
     #[inline(always)]
     pub(super) fn agree(&self, sides: &mut [f64]) -> bool {
         let mut pairs = sides.iter_mut().zip(&self.sides);

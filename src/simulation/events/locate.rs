@@ -1,4 +1,4 @@
-//! The time of an event: an element that ends there is looked for (T-122).
+//! Locates an event: finds the length of the element that ends on it (T-122).
 
 use super::search::Root;
 use super::{Cut, Events, Passage};
@@ -6,25 +6,27 @@ use crate::length::{Length, Polynomial};
 use crate::simulation::acting;
 use crate::simulation::kind::Simulated;
 
-/// What has come of a search for the time of an event.
+/// A located event.
 pub(super) struct Met<const N: usize, L: Length<N>> {
     pub(super) length: f64,
-    /// The time; that of a node where only roundings separate them.
+    /// The time; that of a node if they differ by rounding only.
     pub(super) time: f64,
     pub(super) state: L::State,
     pub(super) velocity: L::Vector,
-    /// The values of all that is watched.
+    /// The values of all watched functions.
     pub(super) values: Vec<f64>,
-    /// Their derivatives by the time, on the polynomial.
+    /// Their time derivatives on the polynomial.
     pub(super) slopes: Vec<f64>,
     pub(super) inside: Option<L::Polynomial>,
 }
 
-/// What lengths may be off by, relative to the step: far from zero roundings of the time are more.
+/// The relative difference from which on lengths are trusted more than differences of times, which lose digits at large
+/// t.
 const DIGITS: f64 = 1e-12;
 
 impl<M, const N: usize, L: Length<N>> Cut<'_, M, N, L> {
-    /// How far it is from where the cut element begins: the difference of times, unless these have not the digits of the step `h`.
+    /// The distance from the start of the element that was cut: the difference of times, or the length where times have
+    /// fewer digits than the step `h`.
     pub(in crate::simulation) fn length_from(&self, from: f64, h: f64) -> f64 {
         let (between, length) = (self.t - from, self.place.length);
         if self.place.inside && (length - between).abs() > DIGITS * h.abs() {
@@ -40,7 +42,8 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// The event of a root: of an element that ends there, or of the polynomial alone where no such element can be solved.
+    /// The event at a root of the polynomial: the end of an element that ends there, or, if no such element can be
+    /// solved, the point of the polynomial.
     pub(super) fn located(
         &mut self,
         arc: &Passage<'_, N, L>,
@@ -65,17 +68,17 @@ where
         }
     }
 
-    /// The length of the element that ends at the event: nodes are more accurate than the polynomial between them, which tells where to begin. None where such an element
-    /// cannot be solved.
+    /// Finds the length of the element whose end lies on the event, starting from the root of the polynomial; nodes are
+    /// more accurate than the polynomial between them. `None` if such an element cannot be solved.
     pub(super) fn locate(
         &mut self,
         arc: &Passage<'_, N, L>,
         root: &Root,
         resolution: f64,
     ) -> Option<Met<N, L>> {
-        /// Corrections of the length; each leaves the square of what was off.
+        /// The largest number of corrections of the length; they converge quadratically.
         const MAX_TRIALS: u32 = 8;
-        /// How far beyond the element a correction may lead, relative to itself; it then ends at the node.
+        /// How far a correction may lead beyond the element, relative to its length; it is then limited to the end.
         const OVERSHOOT: f64 = 0.5;
 
         let Passage {
@@ -132,8 +135,9 @@ where
         met
     }
 
-    /// dg/dt for a correction of the length: between the last two nodes, if that is about what it is `along` the polynomial. Where the function does not cross zero along the polynomial as between its nodes,
-    /// as velocities of low degree, it is what nodes tell.
+    /// dg/dt for a correction of the length: the secant through the last two nodes if it is close to the slope on the
+    /// polynomial. The secant is also used if g crosses zero between nodes but not along the polynomial, as velocities
+    /// of elements of low order can.
     fn slope(
         &self,
         arc: &Passage<'_, N, L>,
@@ -161,7 +165,7 @@ where
         secant.or_else(chord).unwrap_or(along)
     }
 
-    /// dg/dt of all that is watched, on the polynomial.
+    /// The time derivatives of all watched functions on the polynomial.
     fn slopes(&self, arc: &Passage<'_, N, L>, length: f64) -> Vec<f64> {
         const NEAR: f64 = 1e-4;
         let Passage { t, h, dense, .. } = *arc;

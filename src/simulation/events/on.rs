@@ -1,4 +1,4 @@
-//! What a run is asked to look for.
+//! The description of an event: what is watched, in which direction, and what happens there.
 
 use super::act::{Act, Crossing, Occurrence};
 use super::value::Function;

@@ -1,6 +1,8 @@
-//! Which of several events comes first, which come together, and what is known of the others after one has changed the state.
+//! The order of several events in one element, simultaneous events, and the signs of the other functions after an event
+//! has changed the state.
 //!
-//! The roots of an element are those of its polynomial; the nodes of elements that end at the events are more accurate, and may have them in another order. The order of the nodes counts.
+//! Roots are found on the polynomial of the element. The nodes of elements that end at the events are more accurate and
+//! may be in another order; the order of the nodes decides.
 
 use super::act::After;
 use super::locate::Met;
@@ -12,22 +14,23 @@ use crate::length::Length;
 use crate::motion::LastCut;
 use crate::simulation::kind::Simulated;
 
-/// What the node of an event tells of a function that is not that of the event.
+/// What the node at an event says about another watched function.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Standing {
-    /// It changes its sign at the same time, for all that is known of this.
+    /// It changes its sign at the same time, within the uncertainty of the time.
     Together,
-    /// It has changed its sign before, although its root on the polynomial is later.
+    /// It has changed its sign already, although its root on the polynomial comes later.
     Passed,
-    /// It is on this side.
+    /// It has this sign.
     On(f64),
-    /// It has left zero at a time that roundings do not separate from this one.
+    /// It was zero at a time that rounding error does not separate from the event.
     Unknown,
 }
 
-/// Of a function that was on `side`, with its value and its derivative along the run.
+/// Classifies a function that had the sign `side`, from its value and its derivative along the run.
 ///
-/// `uncertainty` is that of the time. `is_beside` says that its root on the polynomial is where that of the event is.
+/// `uncertainty` is that of the time; `is_beside` says that its root on the polynomial coincides with that of the
+/// event.
 fn standing(side: f64, (value, slope): (f64, f64), uncertainty: f64, is_beside: bool) -> Standing {
     if side == 0.0 || value.is_nan() {
         return Standing::Unknown;
@@ -41,27 +44,27 @@ fn standing(side: f64, (value, slope): (f64, f64), uncertainty: f64, is_beside: 
     } else if crosses && side * value < 0.0 {
         Standing::Passed
     } else if value == 0.0 {
-        // Nothing else was seen of it.
+        // No change of sign was seen.
         Standing::On(side)
     } else {
         Standing::On(value.signum())
     }
 }
 
-/// What comes at the time of an event.
+/// The functions at the time of an event.
 pub(super) struct Meeting {
-    /// All that change their signs then, in the order in which they were declared.
+    /// All events at this time, in the order of declaration.
     pub(super) together: Vec<Crossed>,
-    /// Those that have changed their signs before, and could not be met there.
+    /// Events that should have been met earlier.
     pub(super) passed: Vec<Crossed>,
-    /// The sides of all others; 0 where they are not known.
+    /// The signs of all other functions; 0 if unknown.
     pub(super) sides: Vec<f64>,
 }
 
-/// How near to each other events are to be to count as one time, in roundings of the time.
+/// The distance within which events are simultaneous, in units of the resolution of time.
 const TOGETHER: f64 = 8.0;
 
-/// The same of roots of one polynomial.
+/// The same for two roots of one polynomial.
 const BESIDE: f64 = 16.0;
 
 impl<'m, M, const N: usize, L> Events<'m, M, N, L>
@@ -69,12 +72,13 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Whether a change of sign is looked for.
+    /// Whether the direction of a zero crossing is one that its event watches.
     pub(super) fn counts(&self, Crossed { function, rises }: Crossed) -> bool {
         self.watched[function].on.crossing.counts(rises)
     }
 
-    /// The event that nodes meet first: the given one, or one whose function has changed its sign at the node of that already, although its root on the polynomial comes later.
+    /// The first event by nodes: the given one, or one whose function has already changed its sign at that node
+    /// although its root on the polynomial comes later.
     pub(super) fn earliest(
         &mut self,
         arc: &Passage<'_, N, L>,
@@ -110,7 +114,7 @@ where
         }
     }
 
-    /// What comes at the time of an event.
+    /// Classifies all watched functions at the time of an event.
     pub(super) fn meeting(
         &self,
         arc: &Passage<'_, N, L>,
@@ -129,7 +133,7 @@ where
             meeting.together.push(own);
             return meeting;
         }
-        // What the search for the time has left.
+        // The uncertainty that the search for the time has left.
         let left = (met.values[root.function] / met.slopes[root.function]).abs();
         let left = if left.is_finite() { 2.0 * left } else { 0.0 };
         let usual = TOGETHER * resolution;
@@ -165,14 +169,14 @@ where
         meeting
     }
 
-    /// The last cut that this event made, where it was so short a time ago that its function may not have moved since.
+    /// The last cut by this event, if it was so recent that the function may not have moved since.
     pub(super) fn last_of(&self, crossed: Crossed, time: f64) -> Option<LastCut> {
         let Crossed { function, rises } = crossed;
         let last = self.seen.lasts[function]?;
         (last.rises == rises && self.is_soon(last.time, time)).then_some(last)
     }
 
-    /// After an event has cut the element: what of the others is due at once, and on which sides they are.
+    /// Sets the events that are due at once after an element was cut, and the signs of the other functions.
     pub(super) fn leave(
         &mut self,
         (meeting, number): (Meeting, usize),
@@ -198,7 +202,8 @@ where
         self.carry_sides(&met.values, after, (met.time, &met.velocity));
     }
 
-    /// What is recorded at a node from which the run goes on is not met there again, where the polynomial behind it begins with another velocity.
+    /// Marks an event as recorded at the node from which the run continues, so that it is not met again if the next
+    /// polynomial starts with another velocity.
     fn note_recorded(&mut self, Crossed { function, rises }: Crossed, time: f64) {
         self.seen.lasts[function] = Some(LastCut {
             time,
@@ -209,23 +214,26 @@ where
         });
     }
 
-    /// Whether an impact has not been seen to throw the motion back.
+    /// Whether there are impacts after which the motion has not yet been seen to rebound.
     pub(super) fn has_impacts(&self) -> bool {
         let is_impact = |last: &LastCut| last.impact > 0.0;
         self.seen.lasts.iter().flatten().any(is_impact)
     }
 
-    /// Looks at what impacts have done, in an element that ends at `time`, with the values at its start and at its end. A motion that is seen beyond the surface first has come to rest on it: the way
-    /// back was too short to be seen, and forces press the motion through.
+    /// Checks the outcome of impacts, in an element that ends at `time`, with the values at its start and its end. A
+    /// motion that passes the surface instead of rebounding has come to rest on it: the rebound was too short to be
+    /// seen, and the forces press the motion through the surface.
     pub(super) fn check_impacts(
         &mut self,
         remaining: &Remaining,
         [begin, end]: &[Vec<f64>; 2],
         time: f64,
     ) -> Result<(), RunErrorKind> {
-        /// What is left of a velocity that an impact has stopped may be rounding, relative to what it was: a motion without forces stays where it is.
+        /// A depth below this part of the impact speed times the time since the impact is rounding error: a motion
+        /// without forces stays at the surface.
         const ROUNDING: f64 = 1e-9;
-        /// The way through a surface begins on it, relative to where it leads.
+        /// The largest value at the start of the element, relative to that at its end, of a motion that starts on the
+        /// surface.
         const ON_SURFACE: f64 = 1e-3;
         for (function, last) in self.seen.lasts.iter_mut().enumerate() {
             let Some(last) = last.as_mut().filter(|last| last.impact > 0.0) else {
@@ -249,8 +257,8 @@ where
         Ok(())
     }
 
-    /// Of the values before an act, sides that are known are kept where it has left the values as they were, but for roundings. What it has moved is on a side that is found out anew, and a
-    /// change of sign that it makes is no event.
+    /// Takes over the signs before an action for functions whose values it has not changed, except for rounding. The
+    /// signs of the others are unknown until the next element; a change of sign by an action is no event.
     fn carry_sides(
         &mut self,
         values: &[f64],
@@ -271,7 +279,7 @@ where
         }
     }
 
-    /// The values of all that is watched after an act, if the run can go on from there.
+    /// The values of all watched functions after an action, if the run can continue from there.
     fn values_after(
         &self,
         after: &After<'m, M, N, L>,
@@ -294,7 +302,8 @@ where
         Some(row)
     }
 
-    /// Meets the events that are due at the time of the last cut, in the state that it has left, up to the first that acts.
+    /// Meets the events that are due at the time of the last cut, in the state that it has left, up to the first that
+    /// ends an element.
     pub(super) fn meet_due(
         &mut self,
         time: f64,
@@ -336,23 +345,23 @@ mod tests {
         standing(side, (value, slope), TOGETHER * RESOLUTION, false)
     }
 
-    /// A function that rises from below zero.
+    /// The example is a function that rises from below zero.
     #[test]
     fn a_node_tells_where_a_function_is() {
         assert_eq!(of(-1.0, -1e-9, 2.0), Standing::On(-1.0));
         assert_eq!(of(-1.0, 1e-9, 2.0), Standing::Passed);
         for value in [-1e-15, 0.0, 1e-15] {
             assert_eq!(of(-1.0, value, 2.0), Standing::Together);
-            // It has risen at an event before.
+            // It has crossed zero at an earlier event.
             assert_eq!(of(1.0, value, 2.0), Standing::Unknown);
         }
-        // Its root, which did not count, is behind this node after all.
+        // Its root, which was skipped, lies behind this node after all.
         assert_eq!(of(1.0, -1e-9, 2.0), Standing::On(-1.0));
-        // Zero over an interval.
+        // The function is zero over an interval.
         assert_eq!(of(1.0, 0.0, 0.0), Standing::On(1.0));
         assert_eq!(of(0.0, 1.0, 1.0), Standing::Unknown);
         assert_eq!(of(1.0, f64::NAN, 1.0), Standing::Unknown);
-        // It has jumped where the event is.
+        // It jumps at the event.
         let beside = standing(1.0, (-1.0, 3.0), TOGETHER * RESOLUTION, true);
         assert_eq!(beside, Standing::Together);
     }

@@ -1,13 +1,13 @@
-//! The changes of sign of an element that are still to be met.
+//! The zero crossings of an element that are still to be processed.
 
 use super::search::Root;
 
-/// The roots of an element that are still to be met.
+/// The roots in an element that are still to be processed.
 #[derive(Clone, Debug)]
 pub(super) struct Remaining {
-    /// In the order of the polynomial.
+    /// In the order of time on the polynomial.
     roots: Vec<Root>,
-    /// The sides on which the functions are behind all of them; 0 where this is not known.
+    /// The signs of the functions after the last root; 0 if unknown.
     ends: Vec<f64>,
 }
 
@@ -20,13 +20,13 @@ impl Remaining {
         self.roots.first().copied()
     }
 
-    /// The next one of a function.
+    /// The next root of a function.
     pub(super) fn next(&self, function: usize) -> Option<Root> {
         let mut roots = self.roots.iter();
         roots.find(|root| root.function == function).copied()
     }
 
-    /// The side on which a function is before the next one.
+    /// The sign of a function before its next root.
     pub(super) fn side(&self, function: usize) -> f64 {
         match self.next(function) {
             Some(root) if root.rises => -1.0,
@@ -35,7 +35,8 @@ impl Remaining {
         }
     }
 
-    /// The next one of a function has been met, or does not count. Where the polynomial has none, the side of the function is not known any more.
+    /// Removes the next root of a function, which was processed or is not watched. If there is none, the sign of the
+    /// function becomes unknown.
     pub(super) fn take(&mut self, function: usize) {
         match self.roots.iter().position(|one| one.function == function) {
             Some(place) => {
@@ -45,13 +46,13 @@ impl Remaining {
         }
     }
 
-    /// The sides at the end of the element.
+    /// The signs at the end of the element.
     pub(super) fn into_sides(self) -> Vec<f64> {
         self.ends
     }
 }
 
-/// A function that changes its sign.
+/// A zero crossing of a function.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Crossed {
     pub(super) function: usize,

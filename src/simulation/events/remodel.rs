@@ -1,16 +1,16 @@
-//! Models with other parameters.
+//! Changes parameters of a model during a run.
 
 use crate::length::Length;
 use crate::simulation::kind::Simulated;
 use tfe_runtime::Share;
 
-/// A model with other parameters, and these by their numbers.
+/// A model with changed parameters, and the changed parameters by their indices.
 pub(in crate::simulation) type Changed<'m, M> = (Share<'m, M>, Vec<(usize, f64)>);
 
-/// Makes a model with other values of some parameters, if that can be.
+/// Creates a model with other values of some parameters, if its parameters can be set.
 pub(in crate::simulation) type Remodel<'m, M> = fn(&M, &[(usize, f64)]) -> Option<Share<'m, M>>;
 
-/// The [`Remodel`] of a model that may go to other threads.
+/// The [`Remodel`] of a model that can be shared between threads.
 pub(in crate::simulation) fn remodel<'m, M, const N: usize, L>(
     model: &M,
     values: &[(usize, f64)],

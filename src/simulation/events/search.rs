@@ -1,56 +1,59 @@
-//! All changes of sign of functions along an element, in their order.
+//! Finds all zero crossings of functions along an element, in the order of time.
 
 use tfe_runtime::__private::root;
 
-/// A function changes its sign.
+/// A zero crossing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Root {
-    /// Which one.
+    /// The index of the function.
     pub(super) function: usize,
-    /// Where in the element.
+    /// The position in the element, between 0 and 1.
     pub(super) tau: f64,
-    /// Whether from below zero to above.
+    /// Whether the function rises.
     pub(super) rises: bool,
 }
 
 impl Root {
-    /// Whether the function has jumped over zero at the start, and with this slope goes back: where it vanishes next is another root.
+    /// Whether the function has jumped over zero at the start and, by this slope, moves back: its next zero is a
+    /// different root.
     pub(super) fn is_left_at_once(&self, slope: f64) -> bool {
         self.tau == 0.0 && self.is_crossed_with(-slope)
     }
 
-    /// Whether a function with this slope goes over zero as here.
+    /// Whether a slope has the direction of this crossing.
     pub(super) fn is_crossed_with(&self, slope: f64) -> bool {
         let on = if self.rises { slope } else { -slope };
         on > 0.0
     }
 }
 
-/// Where a function is on no side at first it is looked at closer to the start, in parts of the first sample of 4⁻¹, 4⁻², …
+/// If the sign at the start is unknown, the function is also sampled close to the start, at 4⁻¹, 4⁻², … of the first
+/// sample.
 const CLOSER: i32 = 12;
 
-/// Parts of an element that are not cut further.
+/// The smallest part of an element that is examined.
 const NARROWEST: f64 = 1.0 / 1_048_576.0;
 
-/// How often a function may be asked what it does in parts of an element.
+/// The largest number of parts in which bounds of a function are asked for.
 const MAX_QUESTIONS: u32 = 128;
 
-/// What an answer costs of these that says nothing at all.
+/// The price of an answer without any bounds, in answers.
 const COST_OF_SILENCE: u32 = 8;
 
-/// What is known of a function in a part of an element.
+/// What bounds prove about a function in a part of an element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Course {
-    /// It is proved not to vanish, or to rise or fall throughout: its signs at the ends tell all.
+    /// It has no zero, or it is monotonic: the signs at the ends tell all.
     Plain,
-    /// Neither.
+    /// Neither of these is proved.
     Bent,
-    /// Nothing.
+    /// There are no bounds.
     Unknown,
 }
 
-/// The ends of parts of an element in each of which a function changes its sign once at most: that is proved for all but the narrowest, and for those that are left when
-/// too many questions have been asked. These are no wider than one of `samples` equal parts.
+/// Divides an element into parts in each of which a function crosses zero at most once; returns the ends of the parts.
+/// This is proved for all parts but the narrowest, and those left after [`MAX_QUESTIONS`], which are no wider than one
+/// of `samples` equal parts.
 fn places(samples: usize, course: &mut dyn FnMut((f64, f64)) -> Course) -> Vec<f64> {
     let wide = 1.0 / samples as f64;
     let (mut ends, mut level) = (Vec::new(), vec![(0.0, 1.0)]);
@@ -82,9 +85,11 @@ fn places(samples: usize, course: &mut dyn FnMut((f64, f64)) -> Course) -> Vec<f
     ends
 }
 
-/// The changes of sign of the functions that `values` gives at τ, and the sides on which they are at the end. Each is on one of `sides` at the start; zero where that is
-/// not known. The signs are looked at between parts of which `course` tells what a function does there, and where it says nothing in about as many parts as `samples`, and
-/// at the vertex of a parabola where a function comes near zero between them; a change between two parts belongs to the later one.
+/// The zero crossings of the functions `values` (τ), and the signs of the functions at the end. `sides` are the signs
+/// at the start; zero if unknown. Signs are compared at the ends of parts in which `course` proves at most one
+/// crossing; without bounds, of about `samples` equal parts. A pair of crossings between samples is also found at the
+/// vertex of a parabola where a function comes close to zero. A crossing at the boundary of two parts belongs to the
+/// later one.
 pub(super) fn crossings(
     sides: &[f64],
     samples: usize,
@@ -121,13 +126,13 @@ pub(super) fn crossings(
             });
             *side = -*side;
         };
-        // What is left of a zero at the start is rounding; what is no finite number there is none.
+        // If the sign is unknown, a small value at the start is rounding error of a zero; unless it is not finite.
         let rounding = if side == 0.0 && column[0].is_finite() {
             4.0 * column[0].abs()
         } else {
             0.0
         };
-        // So is what roundings of the time leave of it, which in a short element is much.
+        // The rounding error of the time has the same effect, which is large in a short element.
         let rounded = (8.0 * resolution).max(1e-12);
         let finite = column.iter().filter(|value| value.is_finite());
         let starts_off = column[0].abs() > rounded * finite.fold(0.0, |a: f64, b| a.max(b.abs()));
@@ -142,7 +147,7 @@ pub(super) fn crossings(
             } else if side * here < 0.0 {
                 change(from, times[k], &mut side);
             } else if k >= 2 {
-                // Over and back again between the samples, seen at the one before.
+                // A pair of crossings between samples, visible at the previous sample.
                 let [a, b] = [k - 2, k - 1];
                 let ends = (a == 0, k + 1 == times.len());
                 if let Some(tau) = vertex(&times[a..=k], &column[a..=k], side, ends)
@@ -162,8 +167,8 @@ pub(super) fn crossings(
     (roots, ends)
 }
 
-/// Where a parabola through three values on one side of zero comes nearest to it: about the one in the middle, or, where the first of them, or the last, is an end of the element, between that and
-/// the middle.
+/// The minimum of the distance from zero on a parabola through three values of the same sign: about the middle one; if
+/// the first or the last sample is an end of the element, also between it and the middle one.
 fn vertex(
     times: &[f64],
     column: &[f64],
@@ -219,19 +224,19 @@ mod tests {
         assert_eq!(touching, [0.0; 0]);
     }
 
-    /// A root at the start belongs to the part before, unless the side says otherwise.
+    /// A root at the start belongs to the previous element, unless the known sign says otherwise.
     #[test]
     fn sides_carry_over() {
         assert_eq!(taus(0.0, |tau| tau), [0.0; 0]);
         assert_eq!(taus(1.0, |tau| tau), [0.0; 0]);
         assert_eq!(taus(-1.0, |tau| tau), [0.0]);
         assert_eq!(taus(1.0, |tau| 1.0 - tau), [0.0; 0]);
-        // A short hop from the ground, with a rounding at its start.
+        // A short hop from the ground, with a rounding error at its start.
         let hop = taus(0.0, |tau| tau * (1e-3 - tau) - 1e-20);
         assert!(is_near(&hop, &[1e-3]), "{hop:?}");
     }
 
-    /// A pair that no sampling would find, by bounds of the function's derivative 2 (τ − 0.3).
+    /// A pair of roots that sampling would miss, with bounds of the derivative 2 (τ − 0.3).
     #[test]
     fn what_is_proved_is_found() {
         let near = 0.3 + 1e-7;
@@ -253,7 +258,7 @@ mod tests {
         assert_eq!((sides, questions), (vec![1.0], 39));
     }
 
-    /// The same beside the start and beside the end, in the narrowest part there.
+    /// The same close to the start and close to the end, in the narrowest part there.
     #[test]
     fn pairs_at_the_ends_are_found() {
         for expected in [[1e-7, 2e-7], [1.0 - 2e-7, 1.0 - 1e-7]] {
@@ -289,7 +294,8 @@ mod tests {
         );
     }
 
-    /// Of what is infinite or no number at the start, as 1/t at zero, the first side was never known, and its events were lost.
+    /// If a function was infinite or NaN at the start, as 1/t at zero, its sign was never known and its events were
+    /// lost.
     #[test]
     fn values_that_are_not_finite_somewhere_hide_no_root() {
         let inverse = taus(0.0, |tau| 1.0 / tau - 1.0 / 0.55);

@@ -1,4 +1,4 @@
-//! Parameters that are set at events.
+//! Values of parameters that events set.
 
 use super::remodel::{Changed, Remodel};
 use crate::error::RunErrorKind;
@@ -47,7 +47,7 @@ pub struct Settings<const N: usize, L: Length<N> = FixedLength> {
     from: From<N, L>,
 }
 
-/// From where a run goes on.
+/// The state from which the run continues.
 #[derive(Clone, Debug, PartialEq)]
 enum From<const N: usize, L: Length<N>> {
     Here,
@@ -90,7 +90,7 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
         &self.values
     }
 
-    /// The model with these values, and the numbers of the parameters.
+    /// The model with these values, and the indices of the parameters.
     pub(super) fn applied<'m, M: Simulated<N, L>>(
         &self,
         model: &M,
@@ -104,7 +104,7 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
         }
     }
 
-    /// The values with the numbers of their parameters.
+    /// The values with the indices of their parameters.
     fn numbered(&self, names: &[CoordinateName]) -> Result<Vec<(usize, f64)>, RunErrorKind> {
         let number = |(name, value): &(String, f64)| {
             let index = names.iter().position(|own| own.is(name));
@@ -124,7 +124,7 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
         self.values.iter().map(number).collect()
     }
 
-    /// The state from where the run goes on, of the model with the new values.
+    /// The state from which the run continues, for the model with the new values.
     pub(super) fn state<M: Simulated<N, L>>(&self, model: &M, event: &Event<N, L>) -> L::State {
         match &self.from {
             From::Here => event.state(),
@@ -133,7 +133,7 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
         }
     }
 
-    /// The same where the model has the old values still.
+    /// The same for a model that still has the old values.
     pub(super) fn state_nearby<M: Simulated<N, L>>(
         &self,
         model: &M,

@@ -1,4 +1,4 @@
-//! What changes its sign at an event.
+//! The function whose zeros are the events.
 
 use crate::differences::{derivative_by_time, derivative_of_either, resolved};
 use crate::evaluate::Evaluate;
@@ -14,22 +14,22 @@ use tfe_runtime::dual::Dual;
 /// A function of time, coordinates and velocities.
 pub(super) type Function<'m, V> = Arc<dyn Fn(f64, &V, &V) -> f64 + Send + Sync + 'm>;
 
-/// An output of the model, or a function.
+/// An output of the model, or a function given by the user.
 #[derive(Clone)]
 pub(in crate::simulation) enum Value<'m, V> {
-    /// The output's place among all.
+    /// The index of the output.
     Column(usize),
     Function(Function<'m, V>),
 }
 
-/// A distance for differences, relative to what is changed: their error is below roundings, and these are some 1e-13.
+/// The relative step of difference quotients. Their truncation error is below the rounding error, which is about 1e-13.
 const DISTANCE: f64 = 2e-3;
 
-/// The same in time: no simple part of usual periods.
+/// The same in time; not a simple fraction of common periods.
 const DISTANCE_IN_TIME: f64 = 1.570_796e-3;
 
 impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
-    /// The gradient g_q, and g_t; none where g depends on velocities.
+    /// The gradients g_q and g_t; `None` if g depends on velocities.
     pub(super) fn normal<M, L, const N: usize>(
         &self,
         model: &M,
@@ -59,7 +59,7 @@ impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
     }
 }
 
-/// The same of a function, by differences.
+/// The same for a function given by the user, by difference quotients.
 fn normal_of<L: Length<N>, const N: usize>(
     function: &Function<'_, L::Vector>,
     t: f64,
@@ -82,7 +82,7 @@ fn normal_of<L: Length<N>, const N: usize>(
 }
 
 impl<const N: usize> Value<'_, [f64; N]> {
-    /// What it is at an event.
+    /// The value of g at an event.
     pub(in crate::simulation) fn at<M: Model<N>>(&self, model: &M, event: &Event<N>) -> f64 {
         let Event { t, q, p, v, .. } = event;
         match self {
@@ -95,7 +95,7 @@ impl<const N: usize> Value<'_, [f64; N]> {
         }
     }
 
-    /// The change of it, where the velocity changes by `velocity`.
+    /// The derivative of g along a change of the velocity.
     pub(in crate::simulation) fn slope<M: Model<N>>(
         &self,
         along: &Along<'_, M, N>,
@@ -107,7 +107,8 @@ impl<const N: usize> Value<'_, [f64; N]> {
             Self::Column(column) => along.outputs(change, velocity)[*column],
             Self::Function(function) => {
                 let Event { t, q, v, .. } = event;
-                // An event is where something vanishes, and be it the only coordinate: roundings of what stands beside it do not.
+                // An event is at a zero, possibly of the only coordinate: a scale taken from the rounding errors around
+                // it would be meaningless.
                 let part = |change: &[f64; N], of: &[f64; N], least: f64| {
                     let size = largest(of).max(least);
                     largest(change) / if size > 0.0 { size } else { 1.0 }

@@ -1,4 +1,4 @@
-//! What runs are asked to look for, and what looks for it.
+//! The list of events that a run watches.
 
 use super::act::{Act, Crossing, Occurrence, On};
 use super::clear::Clear;
@@ -14,12 +14,12 @@ use std::fmt;
 use std::sync::Arc;
 use tfe_runtime::{CoordinateName, Share};
 
-/// What runs are asked to look for.
+/// The list of events of a run, with the functions that search for them.
 pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     on: Vec<On<'m, N, L>>,
-    /// Makes models with other parameters, where events may ask for them.
+    /// Creates models with changed parameters, if an event can ask for it.
     remodel: Option<Remodel<'m, M>>,
-    /// Called where there is anything to look for, and so compiled for models with events only.
+    /// The search itself; called through a pointer, so that it is only compiled for models that are used with events.
     look: Look<'m, M, N, L>,
     keep_off: KeepOff<'m, M, N, L>,
     meet_due: MeetDue<'m, M, N, L>,
@@ -55,7 +55,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
         self.on.is_empty()
     }
 
-    /// One event more, that sets no parameters.
+    /// Adds an event that sets no parameters.
     pub(in crate::simulation) fn watch(&mut self, on: On<'m, N, L>)
     where
         M: Simulated<N, L>,
@@ -65,7 +65,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
         self.meet_due = Events::meet_due;
     }
 
-    /// The same before all others, also where they come at one time.
+    /// Adds an event before all others; it is the first of simultaneous events.
     pub(in crate::simulation) fn watch_first(&mut self, on: On<'m, N, L>)
     where
         M: Simulated<N, L>,
@@ -74,7 +74,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
         self.on.rotate_right(1);
     }
 
-    /// One event more: of an output, or of a function.
+    /// Adds an event of an output or of a function.
     pub(crate) fn push(
         &mut self,
         name: impl Into<String>,
@@ -95,7 +95,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
 }
 
 impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
-    /// The same of another model.
+    /// The same events for another model.
     pub(in crate::simulation) fn of<T>(self) -> Watching<'m, T, N, L>
     where
         T: Simulated<N, L> + Send + Sync + 'm,
@@ -109,7 +109,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
     }
 }
 
-/// What is to be looked for, in the outputs of these names.
+/// Resolves the events, given the names of the outputs.
 fn watched<'m, const N: usize, L: Length<N>>(
     on: &[On<'m, N, L>],
     names: &[CoordinateName],
@@ -134,7 +134,7 @@ fn watched<'m, const N: usize, L: Length<N>>(
     on.iter().map(watched).collect()
 }
 
-/// What is seen of them before a run.
+/// The record of events before a run.
 fn unseen<const N: usize, L: Length<N>>(watched: &[Watched<'_, N, L>]) -> Seen {
     Seen::nothing(watched.iter().map(|one| one.on.name.clone()).collect())
 }
@@ -152,7 +152,7 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Those of a run.
+    /// Prepares the events of a run.
     pub(in crate::simulation) fn new(
         model: Share<'m, M>,
         watching: &Watching<'m, M, N, L>,

@@ -1,4 +1,4 @@
-//! The same for models of run-time length.
+//! Gradients of losses by the adjoint method, for models of run-time length.
 
 use super::super::setup::Simulation;
 use super::super::trail::Trail;
@@ -18,9 +18,9 @@ use {
 /// Why there is no gradient.
 #[cfg(feature = "sparse")]
 enum Failure {
-    /// An element has none.
+    /// An element has no derivative.
     Element(family::OperatorError),
-    /// The loss has none.
+    /// The loss has no derivative.
     Loss(RunErrorKind),
 }
 
@@ -61,7 +61,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         span: Range<f64>,
         loss: &Loss<'_, 0, RunTimeLength>,
     ) -> Result<(f64, LossGradient<0, RunTimeLength>), RunError<0, RunTimeLength>> {
-        // Of a model that does not fit together there are no columns; the run says why.
+        // A model with inconsistent lengths has no outputs here; the run reports the error.
         if self.model.check().is_ok() {
             let outputs = (0..self.model.columns()).map(|at| self.model.column_name(at));
             let outputs: Vec<_> = outputs.collect();
@@ -82,7 +82,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let (motion, trail) = run.trailed("gradient", start, &span, Trail::default())?;
         #[cfg(feature = "sparse")]
         return run.pulled(motion, &trail, loss);
-        // Refused before.
+        // Such a model was refused above.
         #[cfg(not(feature = "sparse"))]
         {
             drop(trail);
@@ -114,7 +114,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         }
     }
 
-    /// The same from recorded node to recorded node, between which the motion is made once more; `None` where it ends elsewhere then, or has no derivatives.
+    /// The same between recorded nodes, where the run is repeated; `None` if it then ends elsewhere, or has no
+    /// derivatives.
     #[cfg(feature = "sparse")]
     fn by_checkpoints(
         &self,
@@ -156,7 +157,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             let part = loss.part((before.t, after.t), (segment == 0, is_last));
             let mut run = self.clone().record_every(1);
             run.nodes = Some([&[before.t], times].concat());
-            // One at a node belongs to the element that begins there, unless there is none.
+            // A sample at a node belongs to the element that starts there; at the end of the run, to the last element.
             let (from, to) = (before.t, after.t);
             run.impulses
                 .retain(|(t, _)| within(*t, from, to) || (is_last && *t == to));
@@ -187,7 +188,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         made.map_err(|error| operator_failed(error, None, "gradient"))
     }
 
-    /// Goes back over a motion.
+    /// Passes backward over a motion.
     #[cfg(feature = "sparse")]
     fn back(
         &self,

@@ -1,4 +1,4 @@
-//! What a loss sees of a motion, and what that is of states.
+//! The derivatives of a loss by the states at nodes and inside elements of a motion.
 
 use crate::error::RunErrorKind;
 use crate::evaluate::Evaluate;
@@ -17,18 +17,18 @@ use {
     tfe_runtime::family::{self, FamilyState},
 };
 
-/// A loss on its way along the nodes and elements of a motion.
+/// A loss evaluated along the nodes and elements of a motion.
 pub(super) struct View<'a, M, const N: usize, L: Length<N> = FixedLength> {
     model: &'a M,
     seen: &'a Seen,
-    /// The integrals, at a point of weight one.
+    /// The derivatives of the integrand, at a quadrature point of weight one.
     running: Partials,
     points: Points<N, L>,
 }
 
-/// Takes derivatives from outputs and velocities to states, and keeps the sums of parameters.
+/// Transforms derivatives by outputs and velocities into derivatives by states, and sums the derivatives by parameters.
 pub(super) trait Pulls<const N: usize, L: Length<N>> {
-    /// What the loss has of states, in their order.
+    /// The derivatives of the loss by the state, in the order of its components.
     fn pulled(
         &mut self,
         places: &[Sight<'_, L::State, L::Vector>],
@@ -63,7 +63,7 @@ impl<M: family::Model> Pulls<0, RunTimeLength> for family::Backwards<'_, M> {
 }
 
 impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
-    /// Of a motion with such a velocity.
+    /// Prepares the evaluation; `velocity` provides the length of vectors.
     pub(super) fn new(model: &'a M, seen: &'a Seen, velocity: &L::Vector) -> Self {
         let columns = model.output_names().len();
         let mut running = Partials::none(velocity.as_ref().len(), columns);
@@ -78,7 +78,7 @@ impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
         }
     }
 
-    /// What the loss has directly of a node; `None` where it has nothing of it.
+    /// The direct derivatives of the loss at a node; `None` if the loss does not depend on it.
     pub(super) fn of_node(&self, number: usize) -> Option<Partials> {
         let looks = self.seen.of_node(number);
         if looks.is_empty() {
@@ -105,7 +105,7 @@ impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
         Some(partials)
     }
 
-    /// What the integrals have of an element, for each of its pieces; nothing where there are none.
+    /// The derivatives of the integrals over an element, for each of its pieces; empty if there are no integrals.
     pub(super) fn of_element(
         &mut self,
         pull: &mut impl Pulls<N, L>,
@@ -157,7 +157,7 @@ impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
 }
 
 impl<M: Model<N>, const N: usize> View<'_, M, N> {
-    /// The derivative of what the loss has directly of a node by its time, where the state stays as it is.
+    /// The derivative of the direct contribution of a node by its time, at fixed state.
     pub(super) fn by_time(&self, number: usize, node: &Node<N>) -> f64 {
         let Some(partials) = self.of_node(number) else {
             return 0.0;
@@ -186,7 +186,8 @@ impl<M: Model<N>, const N: usize> View<'_, M, N> {
         explicit.sum::<f64>() + products.map(|(factor, slope)| factor * slope).sum::<f64>()
     }
 
-    /// Adds what the integrals have of all elements, times the derivatives along these, by the start, ordered (p, q), and by parameters; explicit derivatives by parameters are left to the sums.
+    /// Adds the derivatives of the integrals over all elements, times the sensitivities along them, by the start, in
+    /// the order (p, q), and by parameters. Explicit derivatives by parameters are left to the sums.
     pub(super) fn add_along(
         &mut self,
         pull: &mut Pull<'_, M, N>,
@@ -219,7 +220,7 @@ impl<M: Model<N>, const N: usize> View<'_, M, N> {
     }
 }
 
-/// Adds what integrals have of the time of a point, and of the length of its element, where these move.
+/// Adds the effect of moving quadrature points and element lengths on the integrals.
 fn add_moving<M: Model<N>, const N: usize>(
     (model, factors): (&M, &[f64]),
     point: &Point<N, FixedLength>,
@@ -255,7 +256,7 @@ fn add_moving<M: Model<N>, const N: usize>(
     }
 }
 
-/// A place at which the loss has no derivatives.
+/// The loss has no derivatives at a place.
 pub(super) struct Unseen;
 
 impl From<AtError> for Unseen {

@@ -1,4 +1,4 @@
-//! Models of fixed size.
+//! Runs of models of fixed size.
 
 use super::super::checks::{check_constraints, check_impulse, check_start, conserves_energy};
 use super::super::masses::mass_signs;
@@ -20,7 +20,7 @@ use tfe_runtime::{
     Statistics, StepError,
 };
 
-/// A stepper that cuts its steps at kinks, if it is to.
+/// Creates a stepper; it cuts steps at kinks if asked to.
 fn cutting<'m, M: Model<N>, const N: usize>(
     stepper: Result<Stepper<'m, M, N>, ElementError>,
     at_kinks: bool,
@@ -93,7 +93,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     }
 
     fn leave_behind(impulses: &mut Vec<Impulse<N>>, t: f64) {
-        // The last element of a run takes those at its end.
+        // Impulses at the end of a run act in its last element.
         impulses.retain(|impulse| impulse.time != t);
     }
 
@@ -257,7 +257,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
             }
         }
         if const { !M::CONSTRAINTS.is_empty() } && count > 0 {
-            // What is against the constraints these take up at once.
+            // Constraints react at once to the part of the impulses that violates them.
             let velocity = self.allowed_velocity(t, state, &[0.0; N]);
             state.p = velocity.map_or([f64::NAN; N], |v| Simulated::momenta(self, t, &state.q, &v));
         }

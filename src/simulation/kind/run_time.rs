@@ -1,4 +1,4 @@
-//! Models of run-time length.
+//! Runs of models of run-time length.
 
 use super::super::acting;
 use super::super::checks::{check_finite, check_impulse, conserves_energies};
@@ -20,7 +20,7 @@ use tfe_runtime::{CoordinateName, Element, Facts, Share, Statistics, StepError};
 
 impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const FACTS: Facts = M::FACTS;
-    // Without sparse factorisations there is nothing else.
+    // Without sparse factorisations, fixed-point iteration is the only method.
     const MAY_ITERATE: bool = M::FACTS.separable && !M::CONSTRAINED;
     const CONSERVES: bool = conserves_energies::<M>();
 
@@ -82,7 +82,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
                 return Err(RunErrorKind::Impulse { time: *time });
             }
         }
-        // They act between elements, which end at breaks.
+        // Impulses act between elements, which end at breaks.
         grid.mesh(span, &[])
     }
 
@@ -240,7 +240,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     ) -> bool {
         let is_kicked = acting::kick(impulses, (t, h), &mut state.p);
         if is_kicked && const { M::CONSTRAINED } {
-            // What is against the constraints these take up at once.
+            // Constraints react at once to the part of the impulses that violates them.
             let velocity = self.allowed_velocity(t, state, &state.p);
             state.p = match velocity {
                 Some(v) => Simulated::momenta(self, t, &state.q, &v),
@@ -324,7 +324,7 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     }
 }
 
-/// A stepper that cuts its steps at kinks, if it is to.
+/// Creates a stepper; it cuts steps at kinks if asked to.
 fn cutting<'m, M: family::Model>(
     stepper: Result<family::Stepper<'m, M>, family::ModelError>,
     at_kinks: bool,
@@ -336,7 +336,7 @@ fn cutting<'m, M: family::Model>(
     })
 }
 
-/// The reactions at a node of a model of run-time length.
+/// The reactions of constraints at a node.
 fn reactions<M: family::Model>(
     model: &M,
     stepper: &mut family::Stepper<'_, M>,
@@ -349,7 +349,7 @@ fn reactions<M: family::Model>(
     reactions.unwrap_or_else(|| vec![f64::NAN; model.constraints()])
 }
 
-/// Refuses states that are not as long as the model, or not finite.
+/// Refuses states of the wrong length or with components that are not finite.
 fn check_lengths(expected: usize, state: &FamilyState) -> Result<(), RunErrorKind> {
     check_length("q", state.q.len(), expected)?;
     check_length("p", state.p.len(), expected)?;

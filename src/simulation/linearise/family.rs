@@ -1,4 +1,4 @@
-//! The same for models of run-time length.
+//! Runs with the transition matrices of all elements, for models of run-time length.
 
 use super::super::setup::Simulation;
 use super::super::trail::Trail;
@@ -34,7 +34,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let (motion, trail) = self.trailed("run_linearised", start, &span, Trail::default())?;
         #[cfg(feature = "sparse")]
         return self.linearised(motion, &trail.elements);
-        // Refused before.
+        // Such a model was refused above.
         #[cfg(not(feature = "sparse"))]
         {
             drop(trail);
@@ -91,7 +91,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     }
 }
 
-/// Why an element has no derivative.
+/// The error of a run one of whose elements has no derivative.
 #[cfg(feature = "sparse")]
 pub(in crate::simulation) fn operator_failed(
     error: family::OperatorError,

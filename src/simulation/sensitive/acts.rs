@@ -1,4 +1,4 @@
-//! What acts of events make of states near those of their events: differences (T-124).
+//! Derivatives of the actions of events, by difference quotients (T-124).
 
 use crate::differences::{SIXTH, derivative, derivative_of_either};
 use crate::error::RunErrorKind;
@@ -11,43 +11,43 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{Model, State, StepError};
 
-/// Distances relative to the state: the error of the formula is below roundings, and these are some 1e-13.
+/// The relative step of difference quotients. Their truncation error is below the rounding error, which is about 1e-13.
 const DISTANCE: f64 = 2e-3;
 
-/// An event, with the derivatives of its state and of its time before anything is done.
+/// An event with the derivatives of its state and of its time before the action.
 pub(super) struct Acting<'a, 'm, M, const N: usize> {
     pub(super) model: &'a M,
     pub(super) along: &'a Along<'a, M, N>,
     pub(super) severed: &'a Severed<'a, 'm, N>,
-    /// Of the state where the event is met, a column for each number of the start and each parameter.
+    /// The derivatives of the state at the event, a column for each component of the start and each parameter.
     pub(super) at: &'a DMatrix<f64>,
     /// ẏ at the event.
     pub(super) rate: &'a DMatrix<f64>,
-    /// Of its time.
+    /// The derivatives of its time.
     pub(super) times: &'a [f64],
 }
 
-/// How an event moves along a column.
+/// How an event moves with the quantity of one column.
 struct Way<const N: usize> {
     change: Change<N>,
     time: f64,
-    /// Among all.
+    /// The index of the parameter, if the quantity is one.
     parameter: Option<usize>,
-    /// What the parameter adds to the velocity.
+    /// The change of the velocity due to the parameter.
     velocity: [f64; N],
-    /// That of differences, in parts of the change.
+    /// The step of difference quotients.
     distance: f64,
-    /// One that is tried before, of a parameter alone: acts may have numbers of the size of one beside it.
+    /// A longer step, which is tried first for a parameter alone: an action may add numbers of the size of 1 to it.
     longer: Option<f64>,
 }
 
-/// A size to measure changes by.
+/// A positive scale for changes.
 fn scale(size: f64) -> f64 {
     if size > 0.0 { size } else { 1.0 }
 }
 
 impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
-    /// The derivatives after the act; `parameter` tells which one a column is by.
+    /// The derivatives after the action; `parameter` returns the parameter of a column.
     pub(super) fn after(
         &self,
         parameter: impl Fn(usize) -> Option<usize>,
@@ -75,7 +75,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         Ok(after)
     }
 
-    /// The state after the act at a part of the change.
+    /// The state after the action for an event that has moved by `s`.
     fn moved(&self, way: &Way<N>, s: f64) -> Result<State<N>, TransitionError> {
         let by = (&self.severed.watched.on, &self.severed.watched.value);
         let found = state_after(self.model, by, self.severed.event, &self.near(way, s));
@@ -83,7 +83,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         found.ok_or(TransitionError::from(StepError::NonFinite))
     }
 
-    /// A number of the state after the act, ordered (p, q), by a parameter alone.
+    /// The derivative by a parameter alone of a component of the state after the action, in the order (p, q).
     fn alone(&self, way: &Way<N>, longer: f64, row: usize) -> Result<f64, TransitionError> {
         let slope = derivative_of_either([longer, way.distance], |s| {
             let numbers = self.moved(way, s).map(|state| [state.p, state.q]);
@@ -95,13 +95,14 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         }
     }
 
-    /// Why a run is refused whose act sets a parameter to a value that depends on the state: the motion behind it is a function of that value, too, and matrices from state to state do not hold it.
+    /// The error of an action that sets a parameter to a value which depends on the state: the later motion also
+    /// depends on this value, which transition matrices between states do not contain.
     pub(super) fn dependent(&self) -> Option<RunErrorKind> {
-        /// What a value may change by where the state changes by all of itself, relative to the value: roundings.
+        /// The largest relative change of a value that is attributed to rounding, for a relative change 1 of the state.
         const ROUNDINGS: f64 = 1e-10;
 
         let Watched { on, value } = self.severed.watched;
-        // What the act sets wherever it is called.
+        // Records the values that the action sets at each call.
         let seen = Arc::new(Mutex::new(None));
         let (act, sets) = (Arc::clone(&on.act), Arc::clone(&seen));
         let watched = move |event: &Occurrence<'_, N>| {
@@ -123,7 +124,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         };
         for way in (0..self.times.len()).filter_map(|column| self.motion(column)) {
             for (place, (name, value)) in set(&way, 0.0)?.into_iter().enumerate() {
-                // Not a number where nearby it sets something else.
+                // NaN if the action sets something else nearby.
                 let nearby = |s: f64| {
                     let settings = set(&way, s).unwrap_or_default();
                     let own = settings.get(place).filter(|(other, _)| *other == name);
@@ -145,9 +146,11 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         None
     }
 
-    /// How the event moves along a column: motion and parameter together where one distance serves both, so that constraints which hold the parameter are kept, else one after the other.
+    /// How the event moves with a column. Motion and parameter are moved together if one step suits both, so that
+    /// constraints that contain the parameter stay satisfied; otherwise one after the other.
     fn ways(&self, column: usize, parameter: Option<usize>) -> Vec<Way<N>> {
-        /// A distance that is shorter than it need be by this loses two digits; in one of a tiny parameter states change by roundings alone.
+        /// The largest ratio of the two steps. A step shorter than necessary by this factor loses two digits; in a step
+        /// suited to a tiny parameter, the state would change by rounding only.
         const TOGETHER: f64 = 100.0;
 
         let motion = self.motion(column);
@@ -181,11 +184,12 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         }
     }
 
-    /// How the event moves along a column with the parameters as they are; none where it stays.
+    /// How the event moves with a column at fixed parameters; `None` if it does not.
     fn motion(&self, column: usize) -> Option<Way<N>> {
         let event = self.severed.event;
         let largest = |values: &[f64; N]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        // An event is where something vanishes, and be it the only coordinate: what it does in a step tells more.
+        // At an event something vanishes, possibly the only coordinate; the change over a step is then the better
+        // scale.
         let rate = Change::<N>::of_column(self.rate, 0);
         let step = self.severed.step.abs();
         let q = scale(largest(&event.q).max(step * largest(&rate.q)));
@@ -203,7 +207,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         })
     }
 
-    /// The event at a part of the change.
+    /// The event moved by `s`.
     fn near(&self, way: &Way<N>, s: f64) -> Near<N> {
         let event = self.severed.event;
         Near {

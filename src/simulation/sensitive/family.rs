@@ -1,4 +1,4 @@
-//! The same for models of run-time length.
+//! Runs with derivatives by parameters and by the start, for models of run-time length.
 
 use super::super::setup::Simulation;
 use super::super::trail::Trail;
@@ -41,7 +41,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let (motion, trail) = self.trailed("run_sensitive", start, &span, trail)?;
         #[cfg(feature = "sparse")]
         return self.differentiated(motion, &trail);
-        // Refused before.
+        // Such a model was refused above.
         #[cfg(not(feature = "sparse"))]
         {
             drop(trail);
@@ -100,7 +100,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             {
                 to += DVector::from_column_slice(by);
             }
-            // Of many elements, each of which may be finite.
+            // A product over many elements can overflow although each factor is finite.
             if !next.iter().all(|one| one.is_finite()) {
                 return Err(StepError::NonFinite.into());
             }
