@@ -1,9 +1,9 @@
-//! Linear equations of elements in a chain: what Newton's method meets in boundary-value problems, periodic motions and
-//! their continuation.
+//! Linear systems of elements in a chain, as Newton's method for boundary-value problems, periodic motions and their
+//! continuation produces them.
 //!
-//! The elements of a mesh are linked node to node, conditions at the two ends close the chain, and a few unknowns
-//! (a period, a parameter) enter everywhere. `chain` solves the whole, at a cost proportional to the number of
-//! elements and without the growth of round-off that stepping from one end to the other has.
+//! Each element of a mesh couples its two nodes, conditions at the two ends close the chain, and a few global unknowns
+//! (a period, a parameter) enter everywhere. `chain` solves the whole system at a cost proportional to the number of
+//! elements, without the growth of rounding errors that shooting from one end to the other has.
 
 mod chain;
 mod constraints;

@@ -56,7 +56,7 @@ pub(crate) struct LinkMut<'a> {
     pub(crate) matrix: &'a mut [f64],
     /// C, m × g.
     pub(crate) global: &'a mut [f64],
-    /// r, of the first right side.
+    /// r, for the first right side.
     pub(crate) right: &'a mut [f64],
 }
 
@@ -68,12 +68,12 @@ pub(crate) struct ClosureMut<'a> {
     pub(crate) last: &'a mut [f64],
     /// B_γ, c × g.
     pub(crate) global: &'a mut [f64],
-    /// b, of the first right side.
+    /// b, for the first right side.
     pub(crate) right: &'a mut [f64],
 }
 
 impl ClosureMut<'_> {
-    /// Makes all rows empty.
+    /// Sets all coefficients to zero.
     pub(crate) fn clear(&mut self) {
         self.first.fill(0.0);
         self.last.fill(0.0);
@@ -84,11 +84,11 @@ impl ClosureMut<'_> {
 
 /// The coefficients of one dense row, Σ w_e · y_e + w_γ · γ = d.
 pub(crate) struct DenseMut<'a> {
-    /// w_0, …, w_E, one after the other.
+    /// w_0, …, w_E, concatenated.
     pub(crate) nodes: &'a mut [f64],
     /// w_γ.
     pub(crate) global: &'a mut [f64],
-    /// d, of the first right side.
+    /// d, for the first right side.
     pub(crate) right: &'a mut f64,
 }
 
@@ -102,9 +102,9 @@ pub(crate) struct Chain {
     equations: Equations,
     sweep: Sweep,
     closing: Closing,
-    /// For each right side y_0, …, y_E.
+    /// y_0, …, y_E for each right side.
     nodes: Vec<f64>,
-    /// For each right side γ.
+    /// γ for each right side.
     globals: Vec<f64>,
     sign: f64,
 }
@@ -178,7 +178,7 @@ impl Chain {
         }
     }
 
-    /// The whole of one right side, from 0; the first is the one that the other accessors show.
+    /// One right side, by its index from 0; the first is the one that the other accessors give.
     ///
     /// Newton's step and the tangent of a branch have the same matrix: the tangent's right side is zero but for the last
     /// dense row, which is one.
@@ -187,7 +187,7 @@ impl Chain {
         &mut self.equations.rights[side]
     }
 
-    /// The matrices A_0, …, A_{E−1}, one after the other, each row by row.
+    /// The matrices A_0, …, A_{E−1}, concatenated, each row by row.
     pub(crate) fn matrices(&self) -> &[f64] {
         &self.equations.matrices
     }
@@ -256,7 +256,8 @@ impl Chain {
         &self.globals[side * g..(side + 1) * g]
     }
 
-    /// How near the equations are to singular ones, after a successful [`solve`](Self::solve): the smallest pivot of those that are left for the ends and the global unknowns, beside the largest.
+    /// The distance from singular equations, after a successful [`solve`](Self::solve): the ratio of the smallest to
+    /// the largest pivot of the closing system.
     pub(super) fn smallest_pivot(&self) -> f64 {
         self.closing.smallest()
     }

@@ -1,27 +1,29 @@
-//! Whether a solution fulfils all constraints as they are declared.
+//! Checks that a solution satisfies all constraints as declared.
 //!
-//! Elements keep as many constraints as are independent where they begin. The others follow from these, unless they contradict them or the position is singular, and nothing else looks
-//! at what they leave.
+//! Elements impose only as many constraints as are independent at their start. The others follow from these, unless
+//! they contradict each other or the position is singular; only this check detects that.
 
 use super::error::AssemblyError;
 use crate::numbers::{larger, norm};
 use tfe_runtime::constrained::{self, START_TOLERANCE};
 use tfe_runtime::{Model, State};
 
-/// Velocities that move so small a part of the positions in one element are rest, as in runs.
+/// The body counts as at rest if it moves less than this part of the largest position in one element, as in runs.
 const REST: f64 = 1e-5;
 
-/// What a constraint leaves at a node.
+/// The violation of a constraint at a node.
 struct Left {
-    /// |φ| over the length of its row.
+    /// |φ| divided by the norm of its gradient.
     position: f64,
-    /// |A v + a| over the length of its row.
+    /// |A v + a| divided by the norm of its row A.
     velocity: f64,
 }
 
-/// Refuses a solution that violates a constraint: by more than a start of a run may, or by more than `tolerance` where that is larger.
+/// Refuses a solution that violates a constraint by more than the larger one of `tolerance` and the limit for the start
+/// of a run.
 ///
-/// Positions are looked at at all nodes, velocities where elements end: a momentum that is given at the very start may point off the constraints, and the first element takes away what does.
+/// Positions are checked at all nodes, velocities at all but the first: the momentum prescribed at the start may
+/// violate the constraints, and the first element removes that part.
 pub(super) fn check<M: Model<N>, const N: usize>(
     model: &M,
     (times, nodes): (&[f64], &[State<N>]),
@@ -37,7 +39,7 @@ pub(super) fn check<M: Model<N>, const N: usize>(
     for (place, (t, node)) in times.iter().zip(nodes).enumerate() {
         model.constraint_rows(*t, &node.q, &mut rows, &mut drift);
         model.constraint_values(*t, &node.q, &mut values);
-        // Who needs the velocity of a momentum that has none says so.
+        // If the velocity does not exist, its users report that.
         let v = constrained::velocity_of(model, *t, &node.q, &node.p, &[0.0; N]);
         let v = v.ok().filter(|_| place > 0);
         if let Some(v) = &v {
@@ -61,7 +63,7 @@ pub(super) fn check<M: Model<N>, const N: usize>(
     for (place, left) in left.iter().enumerate() {
         for (off, scale, position) in [(left.position, extent, true), (left.velocity, speed, false)]
         {
-            // What is not a number does not hold.
+            // A NaN is a violation.
             if !(off <= allowed * scale) {
                 return Err(AssemblyError::Violated {
                     constraint: declared[place % declared.len()].name,

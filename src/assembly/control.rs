@@ -1,11 +1,11 @@
-//! How an assembled problem is solved.
+//! The tolerance and the iteration limit of assembled problems.
 
-/// How an assembled problem is solved.
+/// The stopping criteria of Newton's method for assembled problems.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Control {
-    /// The relative size of the last correction.
+    /// The relative size of the last correction at which the iteration ends.
     pub(crate) tolerance: f64,
-    /// The most iterations.
+    /// The largest number of iterations.
     pub(crate) max_iterations: u32,
 }
 

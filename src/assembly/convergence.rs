@@ -1,42 +1,47 @@
-//! When Newton's method on a chain has arrived, and how far it dares to go.
+//! Convergence test and step control of Newton's method on a chain.
 
 use super::control::Control;
 use super::error::AssemblyError;
 use crate::numbers::larger;
 
-/// Corrections below this one that no longer fall are round-off: a step from here would square them.
+/// Corrections below this size that no longer decrease are rounding errors: one step of quadratic convergence would
+/// reach the precision of the numbers.
 const ROUND_OFF: f64 = 1e-9;
 
-/// The shortest part of a step that is tried.
+/// The shortest fraction of a Newton step that is tried.
 const SHORTEST: f64 = 1.0 / 256.0;
 
-/// Corrections below this part of a component square to its roundings: the next one need not be seen.
+/// After a correction below this relative size of a component, quadratic convergence leaves rounding error only, so no
+/// further correction is needed.
 const SQUARED: f64 = 1e-8;
 
-/// A component that is known to less than this part is not settled, even if its corrections do not fall.
+/// A component with a relative correction above this is not converged, even if its corrections stagnate.
 const SETTLED: f64 = 1e-3;
 
-/// Components below this part of the largest of their kind hold roundings of it, such as those that are zero by symmetry: they are not looked at by themselves. An angle beside a
-/// distance of 1.5·10¹¹ m is 10⁻¹¹ of it.
+/// Components below this part of the largest of their kind may be rounding errors of it, as those that vanish by
+/// symmetry; they are not tested individually. An angle beside a distance of 1.5·10¹¹ m is above it, at 10⁻¹¹.
 const ROUNDINGS: f64 = 1e-12;
 
-/// The most iterations for the sake of small components, once the large ones have arrived.
+/// The largest number of iterations for small components after the large ones have converged.
 const MAX_MORE: u32 = 6;
 
-/// Components above this part of the largest of their kind are large: what corrects them still says what roundings are.
+/// Components above this part of the largest of their kind are large: their corrections determine the level of rounding
+/// errors.
 const LARGE: f64 = 0.1;
 
-/// What corrects a small component by more than so many times what corrects large ones is no rounding of these.
+/// If the correction of a small component exceeds those of the large ones by this factor, it is not due to their
+/// rounding errors.
 const AMPLIFIED: f64 = 16.0;
 
-/// How large a correction is beside the iterate.
+/// The size of a correction relative to the iterate.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Size {
-    /// Coordinates beside the largest coordinate, momenta beside the largest momentum, globals beside their scales; the largest of these parts.
+    /// The largest of: coordinates relative to the largest coordinate, momenta relative to the largest momentum,
+    /// globals relative to their scales.
     whole: f64,
-    /// The largest part that it is of one coordinate or momentum beside the size of this one alone.
+    /// The largest correction of a single component relative to its own size.
     own: f64,
-    /// The same of those whose corrections are more than roundings of what corrects the large ones.
+    /// The same over those components whose corrections exceed the rounding errors of the large ones.
     unsolved: f64,
 }
 
@@ -47,12 +52,12 @@ impl Size {
         unsolved: f64::INFINITY,
     };
 
-    /// The largest part of the whole iterate.
+    /// The size relative to the whole iterate.
     pub(super) fn whole(self) -> f64 {
         self.whole
     }
 
-    /// The same with a correction of something else, beside the size of that. What is not a number stays so.
+    /// The same including the relative correction of another quantity. NaN is kept.
     pub(crate) fn and(self, other: f64) -> Self {
         Self {
             whole: larger(self.whole, other),
@@ -61,10 +66,11 @@ impl Size {
     }
 }
 
-/// The course of the corrections.
+/// The history of the corrections.
 ///
-/// A step after which the next correction would be more than twice as large, or which leaves where the model is defined, is tried again
-/// at half its length. Once the corrections are small beside the iterate, components that are much smaller than the largest are corrected for as long as that makes them better.
+/// A step is repeated with half its length if the next correction would be more than twice as large, or if the step
+/// leaves the domain of the model. Once the corrections are small relative to the whole iterate, iterations continue
+/// for components that are much smaller than the largest, as long as these improve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Convergence {
     control: Control,
@@ -72,12 +78,12 @@ pub(crate) struct Convergence {
     last: Size,
     fraction: f64,
     iterations: u32,
-    /// Iterations after the correction was small beside the whole iterate.
+    /// The number of iterations since the correction has been small relative to the whole iterate.
     more: u32,
 }
 
 impl Convergence {
-    /// From the size of the first correction.
+    /// Begins with the first correction.
     pub(crate) fn new(control: Control, size: Size) -> Self {
         Self {
             control,
@@ -89,19 +95,20 @@ impl Convergence {
         }
     }
 
-    /// Whether the present correction is the last.
+    /// Whether the iteration has converged.
     pub(crate) fn is_done(&self) -> bool {
         self.has_arrived() && !self.is_unsettled()
     }
 
-    /// Whether the correction is small beside the whole iterate, or round-off, which that of a small component need not be that is not yet known at all.
+    /// Whether the correction is small relative to the whole iterate, or is rounding error; the latter is not concluded
+    /// while a small component is still undetermined.
     fn has_arrived(&self) -> bool {
         let (size, last) = (self.size.whole, self.last.whole);
         let stagnates = last < ROUND_OFF && size >= 0.25 * last;
         size <= self.control.tolerance || (stagnates && self.size.unsolved < SETTLED)
     }
 
-    /// Whether a component is still made better that is small beside the others, while iterations are left.
+    /// Whether a small component still improves and iterations are left for it.
     fn is_unsettled(&self) -> bool {
         let (size, last) = (self.size.own, self.last.own);
         let stagnates = size < SETTLED && size >= 0.25 * last;
@@ -110,7 +117,7 @@ impl Convergence {
         !is_known && may_follow
     }
 
-    /// Whether another iteration may follow.
+    /// Checks that another iteration is permitted.
     pub(crate) fn go_on(&self) -> Result<(), AssemblyError> {
         if self.size.whole.is_finite() && self.iterations < self.control.max_iterations {
             return Ok(());
@@ -118,12 +125,12 @@ impl Convergence {
         Err(self.stalled())
     }
 
-    /// Which part of the correction to apply.
+    /// The fraction of the correction to apply.
     pub(crate) fn fraction(&self) -> f64 {
         self.fraction
     }
 
-    /// Judges the correction that follows a step.
+    /// Decides whether to accept a step from the correction that follows it.
     pub(crate) fn accepts(&mut self, is_defined: bool, next: Size) -> bool {
         self.iterations += 1;
         let is_smaller = next.whole <= 2.0 * self.size.whole || next.whole < ROUND_OFF;
@@ -136,11 +143,11 @@ impl Convergence {
         accepted
     }
 
-    /// Takes half of the step that was not accepted, as long as that is something.
+    /// Halves a step that was not accepted, down to [`SHORTEST`].
     pub(crate) fn halve(&mut self) -> Result<(), AssemblyError> {
         self.fraction *= 0.5;
         if self.fraction < SHORTEST {
-            // The one that was tried does not count.
+            // The failed trial does not count.
             self.iterations -= 1;
             return Err(self.stalled());
         }
@@ -157,12 +164,12 @@ impl Convergence {
     }
 }
 
-/// The largest of some values and of their corrections.
+/// The largest magnitudes of several values and of their corrections.
 #[derive(Clone, Copy, Default)]
 struct Largest {
     value: f64,
     correction: f64,
-    /// Zero, or not a number where a correction is none.
+    /// Zero, or NaN if a correction is not finite.
     sum: f64,
 }
 
@@ -183,7 +190,7 @@ impl Largest {
         components.iter().fold(Self::default(), with)
     }
 
-    /// The correction beside the value or beside another scale, whichever is larger; one at most.
+    /// The correction relative to the larger one of value and scale; at most one.
     fn beside(&self, scale: f64) -> f64 {
         if self.correction == 0.0 {
             0.0
@@ -193,7 +200,8 @@ impl Largest {
     }
 }
 
-/// The correction beside the iterate: the largest of those of coordinates, momenta and (already beside their scales) globals. Nodes are (p, q, correction).
+/// The size of a correction relative to the whole iterate. Nodes are (p, q, correction); globals are relative
+/// corrections.
 pub(crate) fn size<'a>(
     nodes: impl Iterator<Item = (&'a [f64], &'a [f64], &'a [f64])>,
     matrices: &[f64],
@@ -202,11 +210,11 @@ pub(crate) fn size<'a>(
     sizes(nodes, matrices, globals).whole
 }
 
-/// The same, with the largest of single components.
+/// The same with the largest relative corrections of single components.
 ///
-/// An orbit near an equilibrium may have no momenta to compare with. The matrices of the elements tell what its coordinates are
-/// worth: momenta count as small beside max |∂p₁/∂q₀| max |q|, and coordinates the other way round. So a component counts as small beside itself and beside what
-/// each other one makes of it in an element, max |∂y₁/∂z₀| max |z|.
+/// Near an equilibrium an orbit may have no momenta to compare with. The matrices of the elements give the scale then:
+/// momenta are compared with max |∂p₁/∂q₀| max |q|, and coordinates correspondingly. A single component is compared
+/// with itself and with the contributions max |∂y₁/∂z₀| max |z| of the others over an element.
 pub(crate) fn sizes<'a>(
     nodes: impl Iterator<Item = (&'a [f64], &'a [f64], &'a [f64])>,
     matrices: &[f64],
@@ -237,14 +245,14 @@ pub(crate) fn sizes<'a>(
     }
     let [own, unsolved] = own_sizes(&components, &largest);
     Size {
-        // Maxima ignore what is not a number; the sum does not.
+        // `f64::max` ignores NaN; the sum does not.
         whole: size + sum,
         own,
         unsolved,
     }
 }
 
-/// The largest magnitude at each place of some square matrices.
+/// The largest magnitudes of the entries over several square matrices.
 fn largest_entries(width: usize, matrices: &[f64]) -> Vec<f64> {
     let mut largest = vec![0.0_f64; width * width];
     for matrix in matrices.chunks_exact((width * width).max(1)) {
@@ -255,7 +263,8 @@ fn largest_entries(width: usize, matrices: &[f64]) -> Vec<f64> {
     largest
 }
 
-/// The largest correction of a component beside the size of it alone, of those that are more than roundings of others, and of those whose corrections are.
+/// The largest correction of a component relative to its own size: over all components above rounding error, and over
+/// those whose corrections are also above it.
 fn own_sizes(components: &[Largest], matrix: &[f64]) -> [f64; 2] {
     let width = components.len();
     let n = width / 2;
@@ -304,7 +313,7 @@ mod tests {
         sizes([node].into_iter(), &[], std::iter::empty())
     }
 
-    /// How many iterations follow a first correction, which is small beside the larger coordinate.
+    /// Checks the number of iterations after a first correction that is small relative to the larger coordinate.
     #[track_caller]
     fn check(q: [f64; 2], corrections: impl IntoIterator<Item = f64>, expected: usize) {
         let mut corrections = corrections.into_iter().map(|second| size(q, [0.0, second]));
@@ -324,9 +333,9 @@ mod tests {
         let beside = [1e11, 1.0];
         check(beside, [1e-3, 1e-6, 1e-12], 2);
         check(beside, [1e-9], 0);
-        // Roundings, which do not fall.
+        // Rounding errors, which do not decrease.
         check(beside, [1e-4, 1e-5, 1e-5], 2);
-        // It goes nowhere: enough.
+        // No improvement: the iteration ends.
         check(beside, [5e-3; 10], 6);
         // Zero by symmetry.
         check([1.0, 1e-17], [1e-17], 0);

@@ -1,4 +1,4 @@
-//! Derivatives of solved chains by parameters, and by what is asked for at their ends (T-156).
+//! Derivatives of solutions of assembled problems by parameters and by the values prescribed at the ends (T-156).
 
 use super::error::AssemblyError;
 use super::newton::{Assembly, By, Iterate, Problem};
@@ -6,7 +6,8 @@ use crate::sensitivity::slopes::directions;
 use tfe_runtime::Element;
 use tfe_runtime::condenser::Direction;
 
-/// How a solution, with its interiors and globals, changes with each of these: the equations of Newton's method, with other right sides.
+/// The derivatives of a solution (nodes, interior unknowns and globals) by each quantity of `by`: the linear system of
+/// Newton's method with other right sides.
 pub(crate) fn derivatives<P: Problem<N>, const N: usize>(
     element: Element,
     problem: &P,
@@ -17,7 +18,7 @@ pub(crate) fn derivatives<P: Problem<N>, const N: usize>(
     if by.is_empty() {
         return Ok(Vec::new());
     }
-    // A direction for each that moves elements.
+    // A direction for each quantity on which the elements depend.
     let (mut more, mut length) = (Vec::new(), None);
     let place = |by: &By| {
         let direction = match by {

@@ -1,16 +1,16 @@
-//! Meshes of assembled problems.
+//! Meshes of assembled problems, relative to their span.
 
 use std::fmt;
 use tfe_runtime::condenser::Direction;
 
-/// The ends of elements as fractions of a span, from 0 to 1.
+/// The nodes of a mesh as fractions of its span, from 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Mesh {
     fractions: Vec<f64>,
 }
 
 impl Mesh {
-    /// Elements as long as their weights say; without weights all alike.
+    /// Elements with lengths proportional to weights; equal lengths without weights.
     pub(crate) fn new(elements: usize, weights: &[f64]) -> Result<Self, MeshError> {
         if elements == 0 {
             return Err(MeshError::NoElements);
@@ -34,12 +34,12 @@ impl Mesh {
             sum += weight;
             fractions.push(sum / total);
         }
-        // The sums need not agree to the last bit.
+        // Rounding may leave the sum slightly off 1.
         fractions[elements] = 1.0;
         Ok(Self { fractions })
     }
 
-    /// With each element in two halves.
+    /// The mesh with every element halved.
     pub(crate) fn halved(&self) -> Self {
         let pairs = self.fractions.windows(2);
         let starts = pairs.flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]);
@@ -53,12 +53,12 @@ impl Mesh {
         self.fractions.len() - 1
     }
 
-    /// The part of the span that an element takes.
+    /// The length of an element as a fraction of the span.
     pub(crate) fn share(&self, element: usize) -> f64 {
         self.fractions[element + 1] - self.fractions[element]
     }
 
-    /// Start time and length of an element of a span.
+    /// The start time and the length of an element, for a given span.
     pub(crate) fn place(&self, element: usize, start: f64, length: f64) -> (f64, f64) {
         (
             start + self.fractions[element] * length,
@@ -66,14 +66,14 @@ impl Mesh {
         )
     }
 
-    /// The times of all ends.
+    /// The times of all nodes.
     pub(crate) fn times(&self, start: f64, length: f64) -> impl Iterator<Item = f64> {
         self.fractions
             .iter()
             .map(move |fraction| start + fraction * length)
     }
 
-    /// The same, the last one as it was given: start and length may miss it by roundings.
+    /// The same with the last time exactly as given, which start and length may miss by rounding.
     pub(crate) fn times_to(&self, end: f64, start: f64, length: f64) -> Vec<f64> {
         let mut times: Vec<f64> = self.times(start, length).collect();
         if let Some(last) = times.last_mut() {
@@ -82,7 +82,7 @@ impl Mesh {
         times
     }
 
-    /// What a unit of the length of the span changes in an element.
+    /// The direction that lengthens the span by one unit, for one element.
     pub(crate) fn stretched(&self, element: usize) -> Direction {
         Direction {
             time: self.fractions[element],
@@ -91,9 +91,10 @@ impl Mesh {
         }
     }
 
-    /// The lengths of so many elements, each with the same arc length in scaled time and phase space, between nodes of which momenta and coordinates are given.
+    /// Lengths of elements that divide the solution into equal arc lengths in scaled time and phase space; the nodes
+    /// are momenta and coordinates.
     pub(crate) fn equidistributed(&self, nodes: &[[&[f64]; 2]], elements: usize) -> Vec<f64> {
-        /// A range below this, of the largest value, is that of roundings.
+        /// A component that varies less than this, relative to its largest value, is constant up to rounding.
         const CONSERVED: f64 = 1e-9;
         let components = nodes.first().map_or(0, |[p, q]| p.len() + q.len());
         let component = |[p, q]: &[&[f64]; 2], k: usize| match k.checked_sub(p.len()) {
@@ -107,12 +108,12 @@ impl Mesh {
                 .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
                     (low.min(value), high.max(value))
                 });
-            // What differs by roundings is conserved.
+            // A variation by rounding only: the component is conserved.
             if high - low > CONSERVED * high.abs().max(low.abs()) {
                 *inverse = 1.0 / (high - low);
             }
         }
-        // Arc length at the nodes.
+        // The arc length at the nodes.
         let mut lengths = vec![0.0];
         let mut total = 0.0;
         for (element, pair) in nodes.windows(2).enumerate() {
@@ -124,7 +125,7 @@ impl Mesh {
             total += square.sqrt();
             lengths.push(total);
         }
-        // Its inverse at equal parts.
+        // The inverse function at equally spaced arc lengths.
         let times: Vec<f64> = self.times(0.0, 1.0).collect();
         let mut weights = Vec::with_capacity(elements);
         let (mut at, mut last) = (0, 0.0);

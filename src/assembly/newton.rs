@@ -1,13 +1,14 @@
 //! Newton's method on assembled elements.
 //!
-//! Unknowns are the states of all nodes, the interior rates of all elements, and a few global numbers γ such as a period. In each
-//! iteration every element is linearised and its interior condensed,
+//! The unknowns are the states of all nodes, the interior rates of all elements, and a few global unknowns γ, such as a
+//! period. In each iteration every element is linearised and its interior unknowns are condensed,
 //!
 //! ```text
 //! δy_{e+1} − A_e δy_e − C_e δγ = Y_e − y_{e+1}                                                     (theory.md, T-81)
 //! ```
 //!
-//! with Y_e the end of the element after its own Newton step; what closes the chain is the [`Problem`]'s.
+//! with Y_e the end of the element after its own Newton step. The [`Problem`] supplies the equations that close the
+//! chain.
 
 use super::chain::{Chain, ClosureMut, DenseMut};
 use super::constraints;
@@ -18,18 +19,18 @@ use crate::numbers::larger;
 use tfe_runtime::condenser::{Condensed, Condenser, Direction, Placed};
 use tfe_runtime::{Element, ElementError, LegendreError, Model, State, Statistics};
 
-/// What a solution is differentiated by.
+/// A quantity by which a solution is differentiated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum By {
     /// A parameter of the model, by its index among all.
     Parameter(usize),
-    /// The number that an equation at the ends asks for, by its row.
+    /// The prescribed value of an equation at the ends, by its row.
     Row(usize),
-    /// The length of the whole, where it is given.
+    /// The length of the span, if it is prescribed.
     Length,
 }
 
-/// What is to be solved: elements in time, and the equations that close their chain.
+/// A problem: elements in time, and the equations that close their chain.
 pub(crate) trait Problem<const N: usize> {
     /// The type of the model.
     type Model: Model<N>;
@@ -41,21 +42,21 @@ pub(crate) trait Problem<const N: usize> {
     fn damping(&self) -> f64 {
         0.0
     }
-    /// What each global changes in an element.
+    /// The derivative of an element by each global.
     fn directions(&self, element: usize, directions: &mut [Direction]);
-    /// What a unit of the length of the whole changes in an element.
+    /// The derivative of an element by the length of the span.
     fn stretched(&self, _element: usize) -> Direction {
         Direction::default()
     }
-    /// A size of a global beside which corrections are small.
+    /// The scale relative to which corrections of a global are measured.
     fn scale(&self, _global: usize) -> f64 {
         1.0
     }
-    /// Takes over new globals.
+    /// Sets the globals.
     fn set_globals(&mut self, globals: &[f64]);
     /// The equations at the ends: B₀ δy₀ + B_E δy_E + B_γ δγ = b.
     fn close(&self, iterate: &Iterate<N>, closure: ClosureMut<'_>) -> Result<(), LegendreError>;
-    /// What a parameter, by its index among all, adds to the right side of the equations at the ends.
+    /// The derivative of the right side of the equations at the ends by a parameter, given by its index among all.
     fn close_by(&self, _: usize, _: &Iterate<N>, _: &mut [f64]) -> Result<(), LegendreError> {
         Ok(())
     }
@@ -63,19 +64,19 @@ pub(crate) trait Problem<const N: usize> {
     fn span(&self, _k: usize, _iterate: &Iterate<N>, _dense: DenseMut<'_>) {}
 }
 
-/// The unknowns.
+/// The unknowns of an assembled problem.
 #[derive(Clone, Debug)]
 pub(crate) struct Iterate<const N: usize> {
     /// The states of the nodes.
     pub(crate) nodes: Vec<State<N>>,
-    /// The interior rates of the elements, one after the other.
+    /// The interior rates of the elements, concatenated.
     pub(crate) interiors: Vec<f64>,
     /// The global unknowns.
     pub(crate) globals: Vec<f64>,
 }
 
 impl<const N: usize> Iterate<N> {
-    /// All numbers times a factor.
+    /// Multiplies all unknowns by a factor.
     pub(crate) fn scale(&mut self, factor: f64) {
         for node in &mut self.nodes {
             node.q = node.q.map(|q| factor * q);
@@ -86,7 +87,7 @@ impl<const N: usize> Iterate<N> {
         }
     }
 
-    /// This and `factor` times another.
+    /// The sum of this and `factor` times another.
     #[must_use]
     pub(crate) fn plus(&self, factor: f64, other: &Self) -> Self {
         let mut sum = self.clone();
@@ -105,17 +106,17 @@ impl<const N: usize> Iterate<N> {
     }
 }
 
-/// The memory of the iteration: linearised elements and the chain that they form.
+/// The workspace of the iteration: the linearised elements and the chain that they form.
 #[derive(Debug)]
 pub(crate) struct Assembly<const N: usize> {
     condenser: Condenser<N>,
     chain: Chain,
-    /// [A | C | end] of each element, row by row; C has the globals, then what else is differentiated by.
+    /// [A | C | end] of each element, row by row; the columns of C are the globals, then the further directions.
     ends: Vec<f64>,
     responses: Vec<f64>,
     directions: Vec<Direction>,
     globals: usize,
-    /// Which direction behind the globals is the length of the whole.
+    /// The index of the length of the span among the further directions.
     length: Option<usize>,
     elements: usize,
     dense: usize,
@@ -123,7 +124,7 @@ pub(crate) struct Assembly<const N: usize> {
 }
 
 impl<const N: usize> Assembly<N> {
-    /// For so many elements and global unknowns, with so many equations over all nodes.
+    /// A workspace for a number of elements, of global unknowns, and of equations over all nodes.
     pub(crate) fn new<M: Model<N>>(
         element: Element,
         elements: usize,
@@ -133,7 +134,7 @@ impl<const N: usize> Assembly<N> {
         Self::by::<M>(element, elements, (globals, dense), (&[], None, 1))
     }
 
-    /// The same that is differentiated by more than the globals, of which one may be the length of the whole, with so many right sides.
+    /// The same with further directions, one of which may be the length of the span, and with a number of right sides.
     pub(super) fn by<M: Model<N>>(
         element: Element,
         elements: usize,
@@ -159,7 +160,8 @@ impl<const N: usize> Assembly<N> {
         })
     }
 
-    /// Lets each linearisation give the tangent as well: how the solution changes with the right side of the last equation over all nodes.
+    /// Makes each linearisation also compute the tangent: the derivative of the solution by the right side of the last
+    /// equation over all nodes.
     #[must_use]
     pub(crate) fn with_tangent(mut self) -> Self {
         let (globals, dense) = (self.globals, self.dense);
@@ -170,12 +172,12 @@ impl<const N: usize> Assembly<N> {
         self
     }
 
-    /// The tangent of the last linearisation, nodes, interiors and globals; see [`with_tangent`](Self::with_tangent).
+    /// The tangent at the last linearisation; see [`with_tangent`](Self::with_tangent).
     pub(crate) fn tangent(&self) -> Iterate<N> {
         self.change(1)
     }
 
-    /// The solution for one of the right sides, nodes, interiors and globals.
+    /// The solution for one of the right sides.
     fn change(&self, side: usize) -> Iterate<N> {
         let (m, columns) = (self.condenser.interior(), self.columns());
         let globals = self.chain.globals_of(side);
@@ -205,7 +207,9 @@ impl<const N: usize> Assembly<N> {
         }
     }
 
-    /// How the solution changes with each of these, a right side each, after the last [linearisation](Self::link); with the place behind the globals of what it does to elements.
+    /// The derivatives of the solution by several quantities, one right side each, after the last
+    /// [linearisation](Self::link). Each quantity comes with the index of its further direction, if elements depend on
+    /// it.
     pub(super) fn changes<P: Problem<N>>(
         &mut self,
         problem: &P,
@@ -241,7 +245,7 @@ impl<const N: usize> Assembly<N> {
         Ok(by.iter().enumerate().map(change).collect())
     }
 
-    /// The columns of an element: its start, the globals and what else it is differentiated by, its end.
+    /// The number of columns of an element: its start, the globals and the further directions, its end.
     fn columns(&self) -> usize {
         2 * N + self.directions.len() + 1
     }
@@ -251,7 +255,7 @@ impl<const N: usize> Assembly<N> {
         self.iterations
     }
 
-    /// What they cost.
+    /// The work of the iterations.
     pub(crate) fn statistics(&self) -> Statistics {
         let mut statistics = *self.condenser.statistics();
         statistics.newton_iterations = u64::from(self.iterations);
@@ -264,12 +268,12 @@ impl<const N: usize> Assembly<N> {
         self.chain.sign()
     }
 
-    /// The transition matrices A_e of the last linearisation, one after the other, row by row.
+    /// The transition matrices A_e of the last linearisation, concatenated, row by row.
     pub(crate) fn transitions(&self) -> &[f64] {
         self.chain.matrices()
     }
 
-    /// An iterate along a curve t ↦ (q, dq/dt).
+    /// The iterate that follows a curve t ↦ (q, dq/dt).
     pub(crate) fn along<P: Problem<N>>(
         &self,
         problem: &P,
@@ -300,7 +304,7 @@ impl<const N: usize> Assembly<N> {
         })
     }
 
-    /// Linearises everything at the iterate and solves; the correction is then in the chain.
+    /// Linearises at the iterate and solves; the correction is then in the chain.
     pub(crate) fn linearise<P: Problem<N>>(
         &mut self,
         problem: &P,
@@ -311,7 +315,7 @@ impl<const N: usize> Assembly<N> {
         self.solve_chain()
     }
 
-    /// Linearises everything at the iterate.
+    /// Linearises at the iterate.
     pub(crate) fn link<P: Problem<N>>(
         &mut self,
         problem: &P,
@@ -372,12 +376,12 @@ impl<const N: usize> Assembly<N> {
         })
     }
 
-    /// The last system.
+    /// The last linear system.
     pub(super) fn chain(&self) -> &Chain {
         &self.chain
     }
 
-    /// The correction beside the iterate.
+    /// The size of the correction relative to the iterate.
     pub(super) fn size<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> Size {
         let nodes = iterate.nodes.iter().enumerate();
         let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], self.chain.node(e)));
@@ -387,24 +391,24 @@ impl<const N: usize> Assembly<N> {
         if const { P::Model::CONSTRAINTS.is_empty() } {
             return size;
         }
-        // Nodes at rest do not feel the reactions, but the matrices do.
+        // At rest, nodes do not depend on the reactions, but the matrices do.
         size.and(REACTIONS * self.interior_size(iterate))
     }
 
-    /// The largest correction of interior unknowns beside the largest of them.
+    /// The largest correction of interior unknowns relative to the largest of them.
     fn interior_size(&self, iterate: &Iterate<N>) -> f64 {
         let mut corrected = iterate.clone();
         self.correct(&mut corrected, 1.0);
         let (mut value, mut change) = (0.0_f64, 0.0_f64);
         for (new, old) in corrected.interiors.iter().zip(&iterate.interiors) {
             value = value.max(new.abs());
-            // `f64::max` would drop a NaN.
+            // `f64::max` would ignore a NaN.
             change = larger(change, (new - old).abs());
         }
         if change == 0.0 { 0.0 } else { change / value }
     }
 
-    /// Adds a fraction of the correction.
+    /// Adds a fraction of the correction to the iterate.
     pub(crate) fn correct(&self, iterate: &mut Iterate<N>, fraction: f64) {
         let globals = self.chain.globals();
         let (m, columns) = (self.condenser.interior(), self.columns());
@@ -433,7 +437,8 @@ impl<const N: usize> Assembly<N> {
         }
     }
 
-    /// Iterates to a solution, which fulfils all constraints. Afterwards the linearisation is that of the solution, up to the tolerance.
+    /// Iterates to a solution and checks that it satisfies all constraints. Afterwards the linearisation is that at the
+    /// solution, up to the tolerance.
     pub(crate) fn solve<P: Problem<N>>(
         &mut self,
         problem: &mut P,
@@ -474,12 +479,12 @@ impl<const N: usize> Assembly<N> {
     }
 }
 
-/// Σ a b, as far as both go.
+/// Σ a b over the shorter length.
 fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// How much a relative correction of reactions counts beside one of the nodes: they carry the rounding of positions over h².
+/// The weight of relative corrections of reactions, which contain the rounding errors of positions divided by h².
 const REACTIONS: f64 = 1e-3;
 
 /// The times of all nodes.

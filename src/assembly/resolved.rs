@@ -1,7 +1,8 @@
-//! Whether a solution is one of the equations of motion, or of the errors of elements alone.
+//! Detects solutions that exist only because of the discretisation error.
 //!
-//! At conjugate points, and at resonance without damping, the equations of motion have no solution, or many. Those of elements have one: they are singular up to the errors of the elements,
-//! and their solution is as large as these are small.
+//! At conjugate points, and at resonance without damping, the equations of motion have no solution or many. The
+//! discrete equations are then singular up to the discretisation error and have one solution, which grows as that error
+//! decreases.
 
 use super::chain::Chain;
 use super::convergence::Size;
@@ -9,22 +10,24 @@ use super::error::AssemblyError;
 use super::newton::{Assembly, Problem};
 use tfe_runtime::Element;
 
-/// Smaller pivots are looked at: with them a solution may be a thousand times as large as what is asked for.
+/// Below this pivot ratio a solution is checked: it may be a thousand times as large as the prescribed values.
 const DOUBTFUL: f64 = 1e-3;
 
-/// With smaller ones roundings of a solution, some 4e-16, move it by more than what counts as such.
+/// Below this pivot ratio the rounding errors of a solution, about 4e-16, change it by more than the limit for rounding
+/// errors.
 const ROUNDINGS: f64 = 1e-6;
 
-/// A solution of which elements of half the length leave less than this part is none: theirs is as many times larger as their errors are smaller, four times at least.
+/// The largest relative change by one correction on a mesh of half the element length. A solution that is due to the
+/// discretisation error grows by the factor by which the error decreases, at least four.
 const LEFT: f64 = 0.5;
 
 impl Chain {
-    /// Whether the equations that were solved are so near to singular ones that a solution should be looked at.
+    /// Whether the equations are so close to singular that the solution should be checked.
     pub(crate) fn is_doubtful(&self) -> bool {
         self.smallest_pivot() < DOUBTFUL
     }
 
-    /// What an iteration that has failed ends with: where roundings alone keep it from its end, the equations are singular.
+    /// The error of a failed iteration: the equations are singular if rounding errors alone prevent convergence.
     pub(crate) fn explained(&self, error: AssemblyError) -> AssemblyError {
         match error {
             AssemblyError::Stalled { iterations, .. } if self.smallest_pivot() < ROUNDINGS => {
@@ -36,7 +39,7 @@ impl Chain {
 }
 
 impl Size {
-    /// Whether one correction on elements of half the length leaves a solution as it is.
+    /// Whether the correction on a mesh of half the element length confirms the solution.
     pub(crate) fn leaves(self) -> bool {
         self.whole() <= LEFT
     }
@@ -53,7 +56,8 @@ impl<const N: usize> Assembly<N> {
         self.chain().explained(error)
     }
 
-    /// Refuses a solution without global unknowns that one correction on elements of half the length, those of `fine`, does not leave. The curve is that of the solution.
+    /// Refuses a solution without global unknowns that one Newton correction on a mesh of half the element length
+    /// (`fine`) does not confirm. `curve` is the solution.
     pub(crate) fn check_resolved<P: Problem<N>>(
         &self,
         element: Element,
@@ -61,7 +65,7 @@ impl<const N: usize> Assembly<N> {
         curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
     ) -> Result<(), AssemblyError> {
         let mut halves = Self::new::<P::Model>(element, elements, 0, 0)?;
-        // What it cannot tell it does not refuse.
+        // If the check itself fails, the solution is accepted.
         let Ok(iterate) = halves.along(fine, curve, Vec::new()) else {
             return Ok(());
         };

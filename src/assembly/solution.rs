@@ -1,4 +1,4 @@
-//! Solved chains of elements.
+//! Solutions of assembled problems.
 
 use super::mesh::Mesh;
 use super::newton::Iterate;
@@ -13,16 +13,16 @@ pub struct Solution<'m, M, const N: usize> {
     pub(crate) model: &'m M,
     pub(crate) element: Element,
     pub(crate) mesh: Mesh,
-    /// Time at the start.
+    /// The start time.
     pub(crate) start: f64,
-    /// Length of the span.
+    /// The length of the span.
     pub(crate) length: f64,
-    /// Time at the end, where start and length lead up to roundings.
+    /// The end time, which start + length may miss by rounding.
     pub(crate) end: f64,
     /// γ of an additional force γ v.
     pub(crate) damping: f64,
     pub(crate) iterate: Iterate<N>,
-    /// Matrix by matrix, row by row.
+    /// Concatenated, row by row.
     pub(crate) transitions: Vec<f64>,
     pub(crate) statistics: Statistics,
 }
@@ -52,12 +52,12 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
         matrices::<N>(&self.transitions)
     }
 
-    /// The motion with the polynomials of the elements.
+    /// The solution as a motion, with the polynomials of the elements.
     pub(crate) fn motion(&self) -> Motion<N> {
         self.motion_told(|_| {})
     }
 
-    /// The same, where the model is told which element comes.
+    /// The same; `tell` is called with the index of each element before it is computed.
     pub(crate) fn motion_told(&self, mut tell: impl FnMut(usize)) -> Motion<N> {
         tell(0);
         let mut motion = Motion::from_start(self.model, self.start, &self.start());
@@ -83,7 +83,7 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
                 ends: &mut ends,
                 response: &mut response,
             };
-            // This linearisation has been done before: it cannot fail now.
+            // The same linearisation succeeded before, so it cannot fail now.
             if condenser
                 .linearise(self.model, placed, &[], condensed)
                 .is_err()
@@ -98,7 +98,7 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
     }
 }
 
-/// Transition matrices, ordered (p, q).
+/// The transition matrices, in the order (p, q).
 pub(crate) fn matrices<const N: usize>(transitions: &[f64]) -> Vec<DMatrix<f64>> {
     let matrices = transitions.chunks_exact(4 * N * N);
     matrices

@@ -1,4 +1,4 @@
-//! The small system in (ŷ_0, ŷ_E, γ) that is left of a chain.
+//! The closing system: the small dense system in (ŷ_0, ŷ_E, γ) that remains of a chain.
 
 use super::equations::{Equations, Shape, Singular};
 use super::sweep::Sweep;
@@ -14,16 +14,16 @@ const THRESHOLD: f64 = 1e-14;
 #[derive(Clone, Debug)]
 pub(super) struct Closing {
     size: usize,
-    /// The length of a row: the size and the number of right sides.
+    /// The length of a row: the number of unknowns plus the number of right sides.
     width: usize,
     rows: Vec<f64>,
-    /// What a unit of each column stands for.
+    /// The scale of each column: the unknown is the solved value times its scale.
     column_scales: Vec<f64>,
-    /// Which unknown each column holds.
+    /// The unknown that each column belongs to.
     order: Vec<usize>,
-    /// The solution, unknown by unknown, with the right sides side by side.
+    /// The solution by unknowns, with all right sides of an unknown side by side.
     solution: Vec<f64>,
-    /// The smallest pivot beside the largest.
+    /// The ratio of the smallest to the largest pivot.
     smallest: f64,
 }
 
@@ -42,7 +42,7 @@ impl Closing {
         }
     }
 
-    /// Writes the rows: the relation that the sweep has left, the closure, the dense rows.
+    /// Writes the rows: the relation left by the elimination, the closure, the dense rows.
     pub(super) fn load(&mut self, shape: &Shape, equations: &Equations, sweep: &Sweep) {
         let (m, c) = (shape.block, shape.closure());
         for (i, row) in self.rows.chunks_exact_mut(self.width).enumerate() {
@@ -55,7 +55,7 @@ impl Closing {
             } else {
                 let (from, given) = sweep.dense(shape, i - m - c);
                 copy_swept(row, from, m);
-                // If the elimination leaves little of the row, that little is as inexact as the row was large.
+                // If the elimination has left little of the row, its error is relative to the size that the row had.
                 given
             };
             scale_row(row, given, 2 * m, self.size);
@@ -63,10 +63,10 @@ impl Closing {
         self.scale_globals(2 * m, sweep.global_sizes());
     }
 
-    /// Chooses units of the global unknowns that make the largest coefficient of each of order one.
+    /// Scales the global unknowns so that the largest coefficient of each is of order one.
     ///
-    /// `in_links` are the largest in the links: after the elimination little may be left of them, which is then as
-    /// inexact as they were large.
+    /// `in_links` are the largest coefficients in the links. If the elimination has left little of them, the error of
+    /// the rest is relative to these.
     fn scale_globals(&mut self, first: usize, in_links: &[f64]) {
         for (j, &size) in (first..).zip(in_links) {
             let rows = || self.rows.chunks_exact(self.width);
@@ -121,7 +121,7 @@ impl Closing {
         Ok(sign)
     }
 
-    /// The place and the size of the largest entry that is left.
+    /// The position and the size of the largest remaining entry.
     fn pivot(&self, step: usize) -> (usize, usize, f64) {
         let mut best = (step, step, 0.0);
         for i in step..self.size {
@@ -135,7 +135,7 @@ impl Closing {
         best
     }
 
-    /// Exchanges rows and columns; whether that was an odd permutation.
+    /// Exchanges rows and columns; returns whether this is an odd permutation.
     fn bring_to_front(&mut self, step: usize, row: usize, column: usize) -> bool {
         let width = self.width;
         if row != step {
@@ -151,7 +151,7 @@ impl Closing {
         (row != step) != (column != step)
     }
 
-    /// Back substitution, and the unknowns in their own order and units.
+    /// Back substitution; writes the unknowns in their original order and scale.
     fn substitute(&mut self) {
         let (n, width) = (self.size, self.width);
         let rights = width - n;
@@ -175,7 +175,7 @@ impl Closing {
         }
     }
 
-    /// The smallest pivot beside the largest, of equations that were solved.
+    /// The ratio of the smallest to the largest pivot, after a successful solution.
     pub(super) fn smallest(&self) -> f64 {
         self.smallest
     }
@@ -189,14 +189,14 @@ impl Closing {
     }
 }
 
-/// Copies a row of the sweep, with ŷ_0 before ŷ_E.
+/// Copies a row of the elimination, with ŷ_0 before ŷ_E.
 fn copy_swept(row: &mut [f64], from: &[f64], m: usize) {
     row[..m].copy_from_slice(&from[2 * m..3 * m]);
     row[m..2 * m].copy_from_slice(&from[..m]);
     row[2 * m..].copy_from_slice(&from[3 * m..]);
 }
 
-/// Copies row k of the closure for the scaled nodes.
+/// Copies row k of the closure, for the scaled nodes.
 fn copy_closure(row: &mut [f64], shape: &Shape, equations: &Equations, scales: &[f64], k: usize) {
     let (m, g) = (shape.block, shape.globals);
     for j in 0..m {
@@ -222,7 +222,7 @@ fn scale_row(row: &mut [f64], given: f64, nodes: usize, size: usize) {
     }
 }
 
-/// The power of two that brings a size between 1 and 2, as far as it is one of an `f64`; 1 for zero.
+/// The power of two that scales a size into [1, 2), within the range of `f64`; 1 for zero.
 fn inverse_power(size: f64) -> f64 {
     if size == 0.0 {
         return 1.0;

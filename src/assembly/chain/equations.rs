@@ -1,4 +1,4 @@
-//! The equations of a chain, and why they are not solved.
+//! The data of a chain: its shape, its equations, and the error if they cannot be solved.
 
 use std::error::Error;
 use std::fmt;
@@ -14,22 +14,22 @@ pub(super) struct Shape {
     pub(super) links: usize,
     /// k, at most m + g.
     pub(super) dense: usize,
-    /// The right sides that are solved for together.
+    /// The number of right sides that are solved for together.
     pub(super) rights: usize,
 }
 
 impl Shape {
-    /// The rows of the closure: m + g − k.
+    /// The number of rows of the closure, m + g − k.
     pub(super) fn closure(&self) -> usize {
         self.block + self.globals - self.dense
     }
 
-    /// The unknowns of all nodes.
+    /// The number of unknowns of all nodes.
     pub(super) fn nodes(&self) -> usize {
         (self.links + 1) * self.block
     }
 
-    /// The unknowns of the closing system, (y_0, y_E, γ).
+    /// The number of unknowns of the closing system, (y_0, y_E, γ).
     pub(super) fn closing(&self) -> usize {
         2 * self.block + self.globals
     }
@@ -72,11 +72,11 @@ impl Equations {
 /// One right side of all equations.
 #[derive(Clone, Debug)]
 pub(crate) struct RightSide {
-    /// r_0, …, r_{E−1}, one after the other.
+    /// r_0, …, r_{E−1}, concatenated.
     pub(crate) links: Vec<f64>,
     /// b.
     pub(crate) closure: Vec<f64>,
-    /// d, one number a dense row.
+    /// d, one number for each dense row.
     pub(crate) dense: Vec<f64>,
 }
 

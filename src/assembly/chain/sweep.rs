@@ -10,9 +10,9 @@ use crate::periodic_schur::{balancing, exponent, power_of_two, reflection};
 pub(super) struct Sweep {
     /// The length of a row, 3m + g + the number of right sides.
     width: usize,
-    /// The relation (m rows), the link (m rows) and the dense rows of the stage in work.
+    /// The relation (m rows), the link (m rows) and the dense rows of the current stage.
     rows: Vec<f64>,
-    /// The rows (R, T, S, G, right sides) of the nodes eliminated, m for each.
+    /// The rows (R, T, S, G, right sides) of the eliminated nodes, m for each.
     stages: Vec<f64>,
     /// The diagonal of D.
     scales: Vec<f64>,
@@ -20,11 +20,11 @@ pub(super) struct Sweep {
     dense_sizes: Vec<f64>,
     /// The largest modulus of a coefficient of each global unknown in the links.
     global_sizes: Vec<f64>,
-    /// The vector of a reflection.
+    /// The vector of a Householder reflection.
     reflector: Vec<f64>,
     /// Its product with the rows.
     projections: Vec<f64>,
-    /// |A_e| at its largest, entry by entry.
+    /// The largest |A_e| over all links, entry by entry.
     most: Vec<f64>,
     exponents: Vec<i64>,
 }
@@ -47,15 +47,15 @@ impl Sweep {
         }
     }
 
-    /// Eliminates ŷ₁, …, ŷ_{E−1}; returns the sign that the determinant has gathered.
+    /// Eliminates ŷ₁, …, ŷ_{E−1}; returns the sign of the determinant collected so far.
     ///
-    /// What is left is read by [`relation`](Self::relation) and [`dense`](Self::dense).
+    /// The remaining rows are given by [`relation`](Self::relation) and [`dense`](Self::dense).
     pub(super) fn eliminate(&mut self, shape: &Shape, equations: &Equations) -> f64 {
         self.balance(equations);
         self.eliminate_scaled(shape, equations)
     }
 
-    /// The same once more where what was left is singular, in other scales; none where there are no others.
+    /// Repeats the elimination in other scales, after the closing system was singular; `None` if there are no others.
     pub(super) fn eliminate_again(&mut self, shape: &Shape, equations: &Equations) -> Option<f64> {
         let is_raised = self.raise();
         is_raised.then(|| self.eliminate_scaled(shape, equations))
@@ -75,7 +75,7 @@ impl Sweep {
                 .copy_from_slice(&self.rows[..m * self.width]);
             self.advance(m);
         }
-        // The columns of y_0 pass those of the E − 1 nodes eliminated, m of each.
+        // Sign of the permutation: the columns of y_0 pass those of the E − 1 eliminated nodes, m for each.
         flips += m * (shape.links - 1);
         if flips % 2 == 0 { 1.0 } else { -1.0 }
     }
@@ -85,12 +85,12 @@ impl Sweep {
         &self.rows[row * self.width..(row + 1) * self.width]
     }
 
-    /// A dense row after the elimination, in the same form, and the largest modulus it has had.
+    /// A dense row after the elimination, in the same form, and the largest modulus that it had before.
     pub(super) fn dense(&self, shape: &Shape, k: usize) -> (&[f64], f64) {
         (self.relation(2 * shape.block + k), self.dense_sizes[k])
     }
 
-    /// The numbers that are stored of the nodes eliminated.
+    /// The number of stored coefficients of the eliminated nodes.
     #[cfg(test)]
     pub(super) fn length(&self) -> usize {
         self.stages.len()
@@ -117,18 +117,18 @@ impl Sweep {
                 }
             }
         }
-        // The identity of each link counts with them: coupling that is small beside it needs no balance.
+        // The identity matrix of each link is included: coupling that is small relative to it needs no balancing.
         balancing(&mut self.most, 1.0, &mut self.exponents);
         for (scale, &exponent) in self.scales.iter_mut().zip(&self.exponents) {
-            // These are exponents for the transpose. The bound keeps D and D⁻¹ normal numbers.
+            // The exponents are those of the transpose. The bound keeps D and D⁻¹ normal numbers.
             *scale = power_of_two(-exponent.clamp(-500, 500));
         }
     }
 
-    /// Raises the scales of components that hardly move others, and are moved even less, as momenta of bodies that nothing holds over a short time: what they move is then as large as they are. Whether
-    /// there are any.
+    /// Enlarges the scales of components that hardly affect others and are affected even less, such as momenta of free
+    /// bodies over a short time, so that their effect is of the size of the components. Returns whether there are any.
     fn raise(&mut self) -> bool {
-        /// Equations in the scales so far lose less.
+        /// The largest such effect; with a larger one the first scales lose few digits.
         const HARDLY: f64 = 1e-10;
 
         let m = self.scales.len();
@@ -147,7 +147,7 @@ impl Sweep {
         is_raised
     }
 
-    /// Makes the first link the relation, and begins the dense rows.
+    /// Takes the first link as the relation, and begins the dense rows.
     fn start(&mut self, shape: &Shape, equations: &Equations) {
         let (m, width) = (shape.block, self.width);
         self.global_sizes.fill(0.0);
@@ -210,7 +210,7 @@ impl Sweep {
         }
     }
 
-    /// Writes the weights of node `e` into the dense rows, in the place of ŷ_{e+1}.
+    /// Writes the weights of node `e` into the dense rows, in the columns of ŷ_{e+1}.
     fn load_weights(&mut self, shape: &Shape, equations: &Equations, e: usize) {
         let (m, width) = (shape.block, self.width);
         let rows = self.rows[2 * m * width..].chunks_exact_mut(width);
@@ -223,9 +223,9 @@ impl Sweep {
         }
     }
 
-    /// Reduces the column block of ŷ_e in relation and link to a triangle.
+    /// Reduces the columns of ŷ_e in the relation and the link to a triangle.
     ///
-    /// Returns how often the sign of the determinant changes: with each reflection and each negative pivot.
+    /// Returns the number of sign changes of the determinant: one for each reflection and each negative pivot.
     fn reduce(&mut self, m: usize) -> usize {
         let width = self.width;
         let rows = &mut self.rows[..2 * m * width];
@@ -274,7 +274,7 @@ impl Sweep {
         }
     }
 
-    /// Moves the lower rows up and ŷ_{e+1} into the place of ŷ_e.
+    /// Moves the lower rows up, and the columns of ŷ_{e+1} to those of ŷ_e.
     fn advance(&mut self, m: usize) {
         let width = self.width;
         let (relation, link) = self.rows[..2 * m * width].split_at_mut(m * width);
@@ -289,7 +289,7 @@ impl Sweep {
         self.shift_dense(m);
     }
 
-    /// Moves ŷ_{e+1} into the place of ŷ_e in the dense rows.
+    /// Moves the columns of ŷ_{e+1} to those of ŷ_e in the dense rows.
     fn shift_dense(&mut self, m: usize) {
         for row in self.rows[2 * m * self.width..].chunks_exact_mut(self.width) {
             row.copy_within(m..2 * m, 0);
@@ -297,7 +297,7 @@ impl Sweep {
         }
     }
 
-    /// Finds the interior nodes from ŷ_0, ŷ_E and γ and takes the scaling off all nodes.
+    /// Computes the interior nodes from ŷ_0, ŷ_E and γ, and removes the scaling of all nodes.
     pub(super) fn substitute(
         &self,
         shape: &Shape,

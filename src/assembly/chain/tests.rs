@@ -167,14 +167,15 @@ fn random_chains_agree_with_a_dense_solve() {
             let (matrix, right) = assembled(&chain, side);
             let expected = matrix.clone().lu().solve(&right).expect("regular");
             let found = solution(&chain, side);
-            // Both are backward stable: 1e-12 where the condition is below 100, as in most of the draws.
+            // Both are backward stable; the condition number is below 100 in most of the draws, which gives 1e-12.
             let error = (&found - &expected).amax() / largest(&expected);
             assert!(
                 error <= 1e-14 * condition.max(100.0),
                 "{shape:?}: {error:e}, condition {condition:e}"
             );
             let residual = (&matrix * &found - right).amax();
-            // Entries are below one: ε times the number of terms and the size of the solution, and a little more.
+            // Entries are below one: the error is ε times the number of terms and the size of the solution, with a
+            // margin.
             assert!(
                 residual <= 1e-14 * found.len() as f64 * largest(&found).max(1.0),
                 "{shape:?}: residual {residual:e}"
@@ -226,7 +227,7 @@ fn coefficients_are_kept_and_may_be_written_again() {
         *x /= 1.5;
     }
     chain.solve().expect("regular");
-    // Nothing of the solve between is left; multiplying and dividing by 3/2 may cost one rounding.
+    // The solution in between leaves no trace; multiplying and dividing by 3/2 may cost one rounding.
     assert_close(solution(&chain, 0).as_slice(), first.as_slice(), 1e-12);
 }
 
@@ -283,7 +284,8 @@ fn check_dichotomic(links: usize, total: f64, dense: usize, close: fn(&mut Chain
     manufacture(&mut chain, &values);
     chain.solve().expect("well conditioned");
     let found = solution(&chain, 0);
-    // The equations are well conditioned, about E where the rate is close to one; the right side alone has an error of ε ρ.
+    // The equations are well conditioned: about E where the rate is close to one. The right side alone has an error of
+    // ε ρ.
     assert_close(
         found.as_slice(),
         &values,
@@ -442,7 +444,7 @@ fn an_undetermined_chain_is_an_error_with_its_rank() {
     unused.dense_mut(0).nodes.fill(1.0);
     assert_eq!(rank(&mut unused), (4, 5));
     assert_eq!(rank(&mut uniform(1, 0, 0, [1.0; 4])), (2, 4));
-    // A dense row that the links imply: y_1 − A y_0 once more.
+    // A dense row that the links imply: y_1 − A y_0 again.
     let mut implied = uniform(3, 0, 1, [2.0, 0.0, 0.0, 0.5]);
     implied.closure_mut().first[0] = 1.0;
     let nodes = implied.dense_mut(0).nodes;
@@ -454,14 +456,14 @@ fn an_undetermined_chain_is_an_error_with_its_rank() {
 
 #[test]
 fn a_phase_condition_and_a_period_make_a_periodic_chain_regular() {
-    // As the circle above, with the rate of turning as an unknown and the phase fixed by an integral.
+    // As the circle above, with the angular frequency as an unknown and the phase fixed by an integral.
     let links = 12;
     let angle = TAU / links as f64;
     let mut chain = Chain::with_right_sides(2, 1, links, 1, 2);
     for e in 0..links {
         let (s, c) = (angle * (e + 1) as f64).sin_cos();
         let link = chain.link_mut(e);
-        // A limit cycle: what is radial at the start of the element decays.
+        // A limit cycle: the radial part of a perturbation decays over the element.
         let (s0, c0) = (angle * e as f64).sin_cos();
         let decay = 0.7;
         link.matrix.copy_from_slice(&[
@@ -482,7 +484,7 @@ fn a_phase_condition_and_a_period_make_a_periodic_chain_regular() {
     chain.solve().expect("regular");
     // The condition number is about 100.
     assert_close(solution(&chain, 0).as_slice(), &values, 1e-13);
-    // The null vector of the rest, normalised by the dense row: the phase, 1/E of the tangent at each node.
+    // The null vector of the other rows, normalised by the dense row: the phase, 1/E of the tangent at each node.
     for e in 0..=links {
         let (s, c) = (angle * e as f64).sin_cos();
         let unit = 1.0 / links as f64;
