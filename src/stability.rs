@@ -134,9 +134,10 @@ where
     Ok(after.tr_mul(&(matrix * &before)))
 }
 
-/// Whether two orthonormal bases span one space: roundings of a state may give another basis of it, whose matrix has other eigenvalues.
+/// Whether two orthonormal bases span the same space. Rounding errors of a state may lead to another basis; a matrix
+/// from one basis to another would have other eigenvalues.
 ///
-/// To √ε, which changes a matrix by ε where one takes the place of the other.
+/// The tolerance √ε changes a matrix by ε if one basis replaces the other.
 fn spans_the_same(one: &DMatrix<f64>, other: &DMatrix<f64>) -> bool {
     one.shape() == other.shape() && (other - one * one.tr_mul(other)).amax() <= f64::EPSILON.sqrt()
 }
@@ -200,7 +201,7 @@ pub fn unstable_intervals<M: Model<N>, const N: usize>(
         if const { M::CONSTRAINTS.is_empty() } {
             transition_matrix(model, element, equilibrium, 0.0, h)
         } else {
-            // The zeros of directions that are no motions are no modes either.
+            // The directions that the constraints exclude have zero eigenvalues, which are no modes.
             on_constraints(model, element, equilibrium, 0.0, h)
         }
     };

@@ -1,4 +1,5 @@
-//! The eigenvalue of largest modulus of an operator that is known by its products alone.
+//! The eigenvalue of largest modulus of an operator given only by its products with vectors (restarted Arnoldi
+//! iteration).
 
 use super::schur_order::Ordered;
 use crate::numbers::norm;
@@ -128,7 +129,7 @@ pub fn dominant_of(
 /// A product of the operator.
 type Apply<'a> = dyn FnMut(&[f64], &mut [f64]) + 'a;
 
-/// The same of no type of its own, so that it is compiled once, here.
+/// The iteration, without type parameters, so that it is compiled only once.
 fn iterate(
     size: usize,
     apply: &mut Apply<'_>,
@@ -167,18 +168,18 @@ fn iterate(
     }
 }
 
-/// A V = V H + v bᵀ with orthonormal columns (V, v).
+/// A Krylov decomposition A V = V H + v bᵀ with orthonormal columns (V, v).
 struct Krylov {
-    /// (V, v), and room.
+    /// (V, v), and unused columns.
     basis: DMatrix<f64>,
-    /// H above, bᵀ in the row below.
+    /// H, and bᵀ in the row below it.
     projected: DMatrix<f64>,
-    /// The columns of V.
+    /// The number of columns of V.
     count: usize,
 }
 
 impl Krylov {
-    /// A start vector that every direction has a part in.
+    /// Begins with a vector that has a component in every direction.
     fn new(size: usize, vectors: usize) -> Self {
         let mut basis = DMatrix::zeros(size, vectors + 1);
         let mut random = 0x2545_f491_4f6c_dd1d_u64;
@@ -200,7 +201,7 @@ impl Krylov {
         }
     }
 
-    /// Fills the basis; says whether it spans an invariant space before.
+    /// Extends the basis to its full size; returns true if it spans an invariant space before that.
     fn expand(
         &mut self,
         apply: &mut Apply<'_>,
@@ -220,7 +221,7 @@ impl Krylov {
             }
             self.count += 1;
             let known = self.basis.columns(0, self.count);
-            // Once more: the first time leaves what cancels.
+            // Orthogonalise twice: the first pass leaves cancellation errors.
             for _ in 0..2 {
                 let parts = known.tr_mul(&image);
                 image.gemv(-1.0, &known, &parts, 1.0);
@@ -241,20 +242,20 @@ impl Krylov {
         Ok(false)
     }
 
-    /// H
+    /// The matrix H.
     fn projection(&self) -> DMatrix<f64> {
         self.projected
             .view((0, 0), (self.count, self.count))
             .into_owned()
     }
 
-    /// bᵀ Z
+    /// The vector bᵀ Z.
     fn coupling(&self, ordered: &Ordered) -> Vec<f64> {
         let row = self.projected.view((self.count, 0), (1, self.count));
         (row * ordered.vectors()).iter().copied().collect()
     }
 
-    /// Keeps the space of the leading eigenvalues.
+    /// Reduces the basis to the space of the leading eigenvalues.
     fn restart(&mut self, ordered: &Ordered, coupling: &[f64]) {
         let kept = ordered.kept();
         let turned = self.basis.columns(0, self.count) * ordered.vectors().columns(0, kept);
@@ -276,7 +277,7 @@ impl Krylov {
 mod tests {
     use super::*;
 
-    /// A block diagonal operator of rotations by angles, times moduli.
+    /// A block diagonal operator of rotations by angles, multiplied by moduli.
     fn turns(moduli: &[f64]) -> impl Fn(&[f64], &mut [f64]) {
         move |x, y| {
             for (k, modulus) in moduli.iter().enumerate() {
@@ -312,7 +313,7 @@ mod tests {
 
     #[test]
     fn operators_of_any_size() {
-        // A pair outside of the crowd, of steps that grow or decay by much.
+        // An eigenvalue pair outside the others, as of a step that grows or decays strongly.
         for size in [1e-200, 1e200] {
             let mut moduli = vec![size; 40];
             moduli[12] = 1.5 * size;

@@ -1,4 +1,4 @@
-//! The four blocks of a matrix over the phase space.
+//! The four blocks of a matrix on phase space.
 
 use nalgebra::{DMatrix, DMatrixView};
 

@@ -6,15 +6,16 @@ use std::f64::consts::PI;
 /// Degree of the interpolants.
 pub(super) const DEGREE: usize = 16;
 
-/// How many of the last coefficients measure the truncation: two, as every other one of an even or odd function is zero.
+/// The number of trailing coefficients that estimate the truncation error: two, since every other coefficient of an
+/// even or odd function is zero.
 const TAIL: usize = 2;
 
-/// cos(jπ/n) for j = 0..2n: the table of both the points and the cosine transform.
+/// cos(jπ/n) for j = 0..2n, for the points and the cosine transform.
 fn cosines() -> [f64; 2 * DEGREE] {
     std::array::from_fn(|j| (PI * j as f64 / DEGREE as f64).cos())
 }
 
-/// The n + 1 Chebyshev points of [start, end], ascending, both ends exactly included.
+/// The n + 1 Chebyshev points of [start, end] in ascending order; both ends are exact.
 pub(super) fn points(start: f64, end: f64) -> [f64; DEGREE + 1] {
     let cosines = cosines();
     let (middle, half) = (f64::midpoint(start, end), 0.5 * (end - start));
@@ -25,7 +26,7 @@ pub(super) fn points(start: f64, end: f64) -> [f64; DEGREE + 1] {
     })
 }
 
-/// A Chebyshev series Σ c_k T_k(x) on [start, end], x the affine image of the argument in [−1, 1].
+/// A Chebyshev series Σ c_k T_k(x) on [start, end]; x in [−1, 1] is the affine image of the argument.
 #[derive(Clone, Debug)]
 pub(super) struct Series {
     start: f64,
@@ -45,7 +46,7 @@ impl Series {
             .map(|k| {
                 let sum: f64 = (0..=DEGREE)
                     .map(|j| {
-                        // The points ascend, the transform counts them from +1 downwards.
+                        // The points ascend, but the transform counts them from +1 downward.
                         let term = values[DEGREE - j] * cosines[(j * k) % (2 * DEGREE)];
                         if j == 0 || j == DEGREE {
                             0.5 * term
@@ -74,15 +75,15 @@ impl Series {
             .fold(0.0, |most, c| c.abs().max(most))
     }
 
-    /// The value at a point of the piece.
+    /// The value at a point of the interval.
     pub(super) fn evaluate(&self, at: f64) -> f64 {
         let x = (2.0 * at - self.start - self.end) / (self.end - self.start);
         clenshaw(&self.coefficients, x.clamp(-1.0, 1.0))
     }
 
-    /// All points inside the piece where the derivative changes its sign, ascending.
+    /// The points inside the interval where the derivative changes its sign, ascending.
     ///
-    /// Coefficients below `noise` at the end of the series are dropped first: they are round-off, and so would be their roots.
+    /// Trailing coefficients below `noise` are dropped first: they are rounding errors and would give spurious points.
     pub(super) fn critical_points(&self, noise: f64) -> Vec<f64> {
         let significant = self
             .coefficients
@@ -126,8 +127,8 @@ fn derivative(coefficients: &[f64]) -> Vec<f64> {
 
 /// All sign changes of a series in (−1, 1), ascending.
 ///
-/// The sign changes of each derivative cut [−1, 1] into monotone pieces of the one before it, each with at most one root; starting
-/// from the derivative that is linear, none can be missed, however close together they are.
+/// The sign changes of each derivative divide [−1, 1] into intervals on which the preceding derivative is monotonic and
+/// has at most one root. Starting from the linear derivative, no root can be missed, however close two of them are.
 fn sign_changes(series: Vec<f64>) -> Vec<f64> {
     let mut derivatives = vec![series];
     while let Some(last) = derivatives.last().filter(|last| last.len() > 2) {
@@ -158,15 +159,16 @@ fn sign_changes(series: Vec<f64>) -> Vec<f64> {
     roots
 }
 
-/// A root between two points (x, f(x)) of opposite signs, by Brent's method, to the last digits.
+/// A root between two points (x, f(x)) of opposite signs, by Brent's method, to full precision.
 ///
-/// An end where f is zero is itself the answer.
+/// An end at which f is zero is returned itself.
 pub(crate) fn bracketed_root<E>(
     mut function: impl FnMut(f64) -> Result<f64, E>,
     start: (f64, f64),
     end: (f64, f64),
 ) -> Result<f64, E> {
-    // Names of Brent (1973): b is the best point, a the one before, c the end on the other side of the root.
+    // The names are those of Brent (1973): b is the best point, a the previous one, c the point on the other side of
+    // the root.
     let ((mut a, mut fa), (mut b, mut fb)) = (start, end);
     let (mut c, mut fc) = (a, fa);
     let (mut step, mut before) = (b - a, b - a);
@@ -216,7 +218,7 @@ pub(crate) fn bracketed_root<E>(
     Ok(b)
 }
 
-/// Brent's method needs a dozen steps as a rule; bisection of all doubles needs about a thousand, which nobody should wait for.
+/// Limit of the steps. Brent's method usually needs about a dozen; in the worst case it could need about a thousand.
 const MOST_STEPS: usize = 200;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Eigenvalues of a real matrix by QR sweeps that are counted.
+//! Eigenvalues of a real matrix by the QR algorithm, with a limit on its sweeps.
 
 use crate::numbers::larger;
 use crate::periodic_schur::size_in_all_units;
@@ -48,7 +48,7 @@ impl fmt::Display for EigenvalueError {
 
 impl Error for EigenvalueError {}
 
-/// Products of three entries between this and its inverse neither over- nor underflow.
+/// Products of three entries between this and its inverse neither overflow nor underflow.
 const MODERATE: f64 = 1e100;
 
 /// The eigenvalues of a square matrix: every λ with det(A − λ) = 0, repeated according to its multiplicity.
@@ -98,7 +98,7 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Eigenvalu
     let found = if largest == 0.0 || (1.0 / MODERATE..=MODERATE).contains(&largest) {
         eigenvalues_of_finite(matrix)
     } else {
-        // Balanced first: a small entry may be the other half of the large one.
+        // Balanced first, since a small entry may be the counterpart of a large one.
         let balanced = balanced(matrix).0;
         let unit = balanced.amax().log2().floor().exp2();
         eigenvalues_of_finite(&(balanced / unit))
@@ -107,13 +107,14 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Eigenvalu
     found.ok_or(EigenvalueError::NoConvergence)
 }
 
-/// The eigenvalues of a finite square matrix, if the iteration converges; in closed form for 2 × 2, so that a symplectic map has radius 1 to round-off.
+/// The eigenvalues of a finite square matrix, if the iteration converges. For 2 × 2 they are in closed form, so that a
+/// symplectic map has spectral radius 1 up to rounding error.
 ///
-/// Otherwise by QR on the balanced matrix. Not nalgebra's: its shifts cancel near the identity, where the matrices of short steps
-/// are, and the iteration stalls.
+/// Otherwise by QR on the balanced matrix. The implementation of nalgebra is not used: its shifts suffer from
+/// cancellation for matrices close to the identity, as those of short steps, and the iteration then stalls.
 pub(super) fn eigenvalues_of_finite(a: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     const MOST_SWEEPS: u32 = 200;
-    /// Every so many sweeps without an eigenvalue the shifts are arbitrary.
+    /// The number of sweeps without a converged eigenvalue after which an exceptional shift is used.
     const EXCEPTIONAL: u32 = 10;
     let size = a.nrows();
     match size {
@@ -166,17 +167,17 @@ pub(super) fn eigenvalues_of_finite(a: &DMatrix<f64>) -> Option<Vec<Complex<f64>
         .then_some(values)
 }
 
-/// Whether the entry below the diagonal in this row may be called zero.
+/// Whether the subdiagonal entry of this row is negligible.
 fn is_negligible(h: &DMatrix<f64>, row: usize, norm: f64) -> bool {
     let around = h[(row - 1, row - 1)].abs() + h[(row, row)].abs();
     let size = if around == 0.0 { norm } else { around };
     h[(row, row - 1)].abs() <= f64::EPSILON * size
 }
 
-/// One implicit double-shift QR sweep on the rows first..=last of a Hessenberg matrix, of at least three rows [GVL, §7.5].
+/// One implicit double-shift QR sweep on the rows first..=last, at least three, of a Hessenberg matrix [GVL, §7.5].
 ///
-/// Only the diagonal block is transformed: the blocks beside it do not influence the eigenvalues. An exceptional sweep uses arbitrary
-/// shifts, for matrices like permutations that the usual ones leave as they are.
+/// Only the diagonal block is transformed, since the blocks beside it do not influence the eigenvalues. An exceptional
+/// sweep uses arbitrary shifts, for matrices such as permutations, which the usual shifts leave unchanged.
 fn double_shift_sweep(h: &mut DMatrix<f64>, first: usize, last: usize, is_exceptional: bool) {
     let (x, y, w) = if is_exceptional {
         let size = h[(last, last - 1)].abs() + h[(last - 1, last - 2)].abs();
@@ -192,8 +193,9 @@ fn double_shift_sweep(h: &mut DMatrix<f64>, first: usize, last: usize, is_except
             h[(last, last - 1)] * h[(last - 1, last)],
         )
     };
-    // The first column of (H − s₁)(H − s₂) over its factor h₂₁, s the eigenvalues of the last 2 × 2 block [[y, ·], [·, x]]; in
-    // differences of diagonal entries: with trace and determinant they would cancel near the identity, and the sweeps stall.
+    // The first column of (H − s₁)(H − s₂) divided by h₂₁, where s are the eigenvalues of the last 2 × 2 block [[y, ·],
+    // [·, x]]. Written with differences of diagonal entries: with trace and determinant it would suffer from
+    // cancellation near the identity, and the sweeps would stall.
     let z = h[(first, first)];
     let (r, s) = (x - z, y - z);
     let mut column = [
@@ -229,7 +231,8 @@ fn double_shift_sweep(h: &mut DMatrix<f64>, first: usize, last: usize, is_except
     }
 }
 
-/// v and f so that (1 − f v vᵀ) maps x to a multiple of the first unit vector; none if x is zero already.
+/// The Householder reflection: v and f such that 1 − f v vᵀ maps x to a multiple of the first unit vector; `None` if x
+/// is zero.
 fn reflection(x: &[f64]) -> Option<([f64; 3], f64)> {
     let largest = x.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
     if largest == 0.0 || !largest.is_finite() {
@@ -241,7 +244,7 @@ fn reflection(x: &[f64]) -> Option<([f64; 3], f64)> {
     Some((v, 2.0 / v.iter().map(|entry| entry * entry).sum::<f64>()))
 }
 
-/// Of entries of any size; the off-diagonal ones matter by their product alone.
+/// The eigenvalues of a 2 × 2 matrix with entries of any size; the off-diagonal ones enter only by their product.
 pub(super) fn eigenvalues_of_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
     let is_moderate = |x: f64| x == 0.0 || (1.0 / MODERATE..=MODERATE).contains(&x.abs());
     if [a, b, c, d].into_iter().all(is_moderate) {
@@ -268,7 +271,7 @@ fn of_moderate_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
         ];
     }
     let root = discriminant.sqrt();
-    // A sum of like signs keeps all digits; the other one follows from the determinant.
+    // The sum with equal signs keeps all digits; the other eigenvalue follows from the determinant.
     let large = mean + root.copysign(mean);
     let small = if large == 0.0 {
         0.0
@@ -278,10 +281,12 @@ fn of_moderate_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
     [large.max(small), large.min(small)].map(|value| Complex::new(value, 0.0))
 }
 
-/// A similar matrix D⁻¹AD whose rows and columns are of comparable size, and the diagonal of D, powers of two.
+/// A similar matrix D⁻¹AD with rows and columns of comparable size, and the diagonal of D, which consists of powers of
+/// two.
 ///
-/// Momenta and coordinates have different units, and QR is only accurate relative to the largest entry. Nothing depends on a free coordinate, and a conserved
-/// momentum depends on nothing: where only the row or only the column has entries, these are made no larger than [`size_in_all_units`].
+/// Momenta and coordinates have different units, and QR is only accurate relative to the largest entry. A free
+/// coordinate has only a column of zeros, and a conserved momentum only a row of zeros, beside the diagonal: entries in
+/// such a row or column are made no larger than [`size_in_all_units`].
 pub(super) fn balanced(a: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
     const SWEEPS: usize = 8;
     let size = size_in_all_units(a.as_slice(), a.nrows());
@@ -324,7 +329,7 @@ pub(super) fn balanced(a: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
     (a, diagonal)
 }
 
-/// The size that the round-off of QR is relative to: in balanced units the largest entry, at each place, zeros included.
+/// The scale of the rounding errors of QR in each entry, zeros included: the largest entry in balanced units.
 pub(super) fn backward_error(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (balanced, units) = balanced(a);
     let largest = balanced.amax();
@@ -333,7 +338,7 @@ pub(super) fn backward_error(a: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// max |λ|; NaN if one is.
+/// max |λ|; NaN if one eigenvalue is NaN.
 pub(super) fn largest_modulus(eigenvalues: &[Complex<f64>]) -> f64 {
     eigenvalues
         .iter()
@@ -448,7 +453,7 @@ mod tests {
                     1.0,
                 ],
             );
-            // The two ones are in one Jordan block, known to the root of round-off.
+            // The double eigenvalue 1 belongs to a Jordan block and is known to √ε.
             let expected = [(cos, sin), (cos, -sin), (1.0, 0.0), (1.0, 0.0)];
             check(&step, &expected, 1e-6);
         }

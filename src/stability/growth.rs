@@ -1,4 +1,4 @@
-//! Whether an element moves a linear model faster than it moves itself: the unstable intervals of steps, seen from a run.
+//! Detects numerical instability of an element for a linear model: the unstable step sizes, as seen from a run.
 
 use super::eigenvalues::{backward_error, balanced, eigenvalues_of_finite};
 use super::linear_model::LinearModel;
@@ -6,35 +6,36 @@ use super::sign_functions::Measure;
 use nalgebra::DMatrix;
 use tfe_runtime::Element;
 
-/// A mode that an element makes grow although the frozen model does not.
+/// A mode that grows by the element although it does not grow in the linear model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Growth {
     /// The modulus of its eigenvalue in the transition matrix of the element.
     pub(crate) radius: f64,
-    /// The modulus |e^{λh}| of its eigenvalue in the flow of the frozen model.
+    /// The modulus |e^{λh}| of its eigenvalue in the exact flow of the linear model.
     pub(crate) exact: f64,
 }
 impl<const N: usize> LinearModel<N> {
-    /// The mode that one step of `element` amplifies most beyond what the frozen model does; none where the growth is the model's own, or
-    /// where there is no transition matrix.
+    /// The mode that one step of `element` amplifies most beyond its exact growth; `None` if there is no such mode or
+    /// no transition matrix.
     ///
-    /// The moduli of both spectra are compared in the order of size, so that a slow unstable mode of the model does not hide a fast mode
-    /// that grows by the method. With μ the eigenvalues of the element, mode k counts if
+    /// The moduli of both spectra are compared in the order of size, so that a slow unstable mode of the model does not
+    /// hide a fast mode that grows numerically. With μ the eigenvalues of the element, mode k counts if
     ///
     /// ```text
     /// ln |μ_k| > 1.5 max(0, Re λ_k h) + 10⁻⁷ .
     /// ```
     ///
-    /// Where the model itself grows, an element is inaccurate before it is wrong, hence the factor. Double eigenvalues in one Jordan
-    /// block, as every free coordinate has, are known to √ε = 1.5·10⁻⁸ in units of the matrix, hence the summand; blocks that are larger
-    /// or worse conditioned show in what small perturbations of the matrix do, which the excess must exceed as well.
+    /// The factor allows for the discretisation error of growing modes. The summand allows for double eigenvalues in a
+    /// Jordan block, as every free coordinate has: they are known to √ε = 1.5·10⁻⁸ in units of the matrix. Larger or
+    /// worse conditioned blocks are detected by small perturbations of the matrix; the excess must also exceed their
+    /// effect.
     ///
-    /// A step that resolves all modes, ‖S‖ h < 1, is not looked at: modes of an oscillator are unstable from λh = 2 on at the earliest (two
-    /// Lobatto points), so that neither eigenvalues nor an element are computed for the usual run.
+    /// A step that resolves all modes, ‖S‖ h < 1, is not examined: an oscillator is stable at least up to λh = 2 (two
+    /// Lobatto points). Usual runs therefore compute neither eigenvalues nor a transition matrix here.
     pub(crate) fn growth(&self, element: Element, h: f64) -> Option<Growth> {
         const RATE: f64 = 1.5;
         const DEFECTIVE: f64 = 1e-7;
-        /// Four random perturbations may miss the worst direction.
+        /// A safety factor: four random perturbations may miss the worst direction.
         const TRUST: f64 = 4.0;
         let generator = self.generator() * h;
         if !(1.0..f64::INFINITY).contains(&row_sum_norm(&balanced(&generator).0)) {
@@ -62,7 +63,7 @@ impl<const N: usize> LinearModel<N> {
     }
 }
 
-/// The logarithms of the moduli of all eigenvalues, the largest first.
+/// The logarithms of the moduli of all eigenvalues, in descending order.
 fn logarithms(matrix: &DMatrix<f64>) -> Option<Vec<f64>> {
     let values = eigenvalues_of_finite(matrix)?;
     Some(descending(
@@ -138,9 +139,9 @@ mod tests {
         for element in (2..=6).flat_map(every_rule) {
             let mut largest = 0.0_f64;
             for xi in [0.0, 0.01, 1.0] {
-                // Not finer than the bubbles of six nodes: one of them is enough.
+                // The grid is coarser than the unstable intervals of six nodes, but one hit is enough.
                 for rho in (1..80).map(|k| 0.5 * f64::from(k)) {
-                    // Backwards in time, a negative damping decays.
+                    // Backward in time, a negative damping decays.
                     for (xi, h) in [(xi, rho), (-xi, -rho)] {
                         let a = transition_matrix(&oscillator(1.0, xi), element, &rest, 0.0, h)
                             .expect("a linear step");
@@ -148,7 +149,7 @@ mod tests {
                     }
                 }
             }
-            // Undamped ones have radius one; the entries are of the size of ρ, times some roundings.
+            // Without damping the spectral radius is one; the entries are of the size of ρ, times a few ulps.
             assert_eq!(
                 largest <= 1.0 + 1e-11,
                 element.is_a_stable(),
@@ -162,13 +163,14 @@ mod tests {
         for rho in [1e-6, 0.1, 1.0, 3.16, 3.465, 7.74] {
             assert_eq!(at(rho), None, "ρ = {rho}");
         }
-        // Both ways in time: √10 < ρ < √12, and beyond √60.
+        // In both directions of time: √10 < ρ < √12, and beyond √60.
         for rho in [3.163, 3.3112897574651194, 3.464, 7.75, -3.3, -8.0] {
             let growth = at(rho).unwrap_or_else(|| panic!("ρ = {rho}"));
             assert!(growth.radius > 1.0 + 1e-3, "ρ = {rho}: {growth:?}");
             assert_eq!(growth.exact, 1.0);
         }
-        // stability_bubbles.json; the radius has a square root in it, but is flat at its maximum.
+        // From stability_bubbles.json. The radius behaves like a square root at the ends of an interval, but is flat at
+        // its maximum.
         let worst = at(3.3112897574651194).expect("the worst of the bubble");
         assert!((worst.radius - 1.129817690854696).abs() < 1e-12);
     }
@@ -182,13 +184,14 @@ mod tests {
                 }
             }
         }
-        // T-54 with ρ² → −h²: the matrix of two nodes has a pole at h = √6, and no likeness to e^h near it.
+        // T-54 with ρ² → −h²: the matrix of two nodes has a pole at h = √6, and is not close to e^h near it.
         assert!(saddle().growth(Element::primal(2), 2.4).is_some());
     }
 
     #[test]
     fn an_unstable_model_does_not_hide_a_bubble() {
-        // A saddle that grows by e^{0.33} beside an oscillator in its bubble, where the radius is 1.13 < e^{0.33}.
+        // A saddle that grows by e^{0.33}, and an oscillator in an unstable interval where the radius is 1.13 <
+        // e^{0.33}.
         let mut both = LinearModel::<2> {
             second: Second::ZERO,
         };
@@ -219,7 +222,7 @@ mod tests {
 
     #[test]
     fn free_coordinates_are_no_growth() {
-        // Four eigenvalues in one Jordan block, H = ½ p₁² + q₁ p₂: round-off spreads them by its fourth root.
+        // Four eigenvalues in one Jordan block, H = ½ p₁² + q₁ p₂: rounding errors split them by ε^{1/4}.
         let mut chain = LinearModel::<2> {
             second: Second::ZERO,
         };

@@ -1,12 +1,14 @@
-//! Every interval of a parameter in which a transition matrix has a spectral radius above one.
+//! All intervals of a parameter in which the spectral radius of a transition matrix exceeds one.
 //!
-//! A grid of spectral radii cannot find intervals of width 10⁻⁵, and the radius has the singularity of a square root at their ends.
-//! Smooth functions of the matrix that change sign where stability changes have neither fault: `sign_functions` lists them.
+//! A grid of spectral radii cannot find intervals of width 10⁻⁵, and the radius behaves like a square root at their
+//! ends. The search therefore uses smooth functions of the matrix that change sign where stability changes;
+//! `sign_functions` lists them.
 //!
-//! They are interpolated piecewise on Chebyshev points until resolved (`pieces`); between neighbouring critical points of the
-//! interpolant a function is monotone, and a change of sign is one root, polished on the function itself. What looks like a double
-//! zero is magnified and interpolated again, down to round-off. All roots together cut the range; the spectral radius inside says
-//! which pieces are unstable (`changes`), and golden section where it is largest (`worst`).
+//! The functions are interpolated piecewise at Chebyshev points until resolved (`pieces`). Between successive critical
+//! points of the interpolant a function is monotonic; a change of sign is one root, which is refined with the function
+//! itself. An apparent double zero is magnified and interpolated again, down to rounding error. All roots together
+//! divide the range; the spectral radius inside the parts tells which are unstable (`changes`), and golden-section
+//! search finds its maximum (`worst`).
 
 mod changes;
 mod error;
@@ -124,7 +126,7 @@ pub fn stability_changes_of<E>(
     })
 }
 
-/// Runs a search that knows nothing of the errors of its matrix, and names the one that ended it.
+/// Runs a search that does not depend on the error type of the matrix, and restores the error that ended it.
 fn named<T, E>(
     mut matrix: impl FnMut(f64) -> Result<DMatrix<f64>, E>,
     search: impl FnOnce(&mut dyn FnMut(f64) -> Result<DMatrix<f64>, Withheld>) -> Result<T, Failure>,
@@ -139,7 +141,7 @@ fn named<T, E>(
     let found = search(&mut withholding);
     found.map_err(|failure| match (failure, held) {
         (IntervalError::Matrix { at, .. }, Some(source)) => IntervalError::Matrix { at, source },
-        // Without an error there is none to name: it is unresolved there.
+        // There is no error to restore: the search is unresolved there.
         (IntervalError::Matrix { at, .. }, None) => IntervalError::Unresolved {
             near: at,
             evaluations: 0,

@@ -141,7 +141,7 @@ impl<const N: usize> LinearModel<N> {
             }
         })
     }
-    /// One step of an element; none where it has no transition matrix.
+    /// The transition matrix of one element; `None` if there is none.
     pub(super) fn transition(&self, element: Element, h: f64) -> Option<DMatrix<f64>> {
         let mut entries = vec![0.0; 4 * N * N];
         transition::of_rest(self, element, h, &mut entries).ok()?;
@@ -152,7 +152,7 @@ impl<const N: usize> LinearModel<N> {
             .then_some(matrix)
     }
 }
-/// A x, or Aᵀ x where `transposed`.
+/// A x, or Aᵀ x if `transposed`.
 fn product<R: Real, const N: usize>(a: &[[f64; N]; N], x: &[R; N], transposed: bool) -> [R; N] {
     std::array::from_fn(|i| {
         let mut sum = R::from_f64(0.0);
@@ -261,12 +261,12 @@ mod tests {
                 x[a] += by;
                 x
             };
-            // Central differences of a quadratic function are exact.
+            // Central differences are exact for a quadratic function.
             let by_p = 0.5 * (at(q, moved(p, 1.0)) - at(q, moved(p, -1.0)));
             let by_q = 0.5 * (at(moved(q, 1.0), p) - at(moved(q, -1.0), p));
             assert!((by_p - first.z[a]).abs() < 1e-14 && (by_q - first.q[a]).abs() < 1e-14);
         }
-        // LinearModel again, it is itself; and a short step is 1 + hS, with an error of (‖S‖h)² < 10⁻⁹.
+        // The linearisation of a LinearModel is itself; a short step is 1 + hS with an error of (‖S‖h)² < 10⁻⁹.
         let again = LinearModel::about(&frozen, 0.0, &State { q, p }).expect("regular");
         assert_eq!(again.second, frozen.second);
         let h = 1e-6;

@@ -1,4 +1,4 @@
-//! Stability over a plane of two parameters.
+//! Stability maps over a plane of two parameters.
 
 mod error;
 mod floquet;
@@ -140,7 +140,7 @@ impl MapPlan {
         Ok(self.computed(|| (), |(), x, y| radius(x, y)))
     }
 
-    /// The map of `point`, which may use memory made once a row.
+    /// Computes all cells with `point`, which may use memory that is created once for each row.
     fn computed<E, S>(
         &self,
         memory: impl Fn() -> S + Sync,
@@ -191,12 +191,12 @@ fn centre(range: &Range<f64>, k: usize, count: usize) -> f64 {
     range.start * (1.0 - fraction) + range.end * fraction
 }
 
-/// The cell in which a number lies.
+/// The index of the cell that contains a number.
 fn cell(range: &Range<f64>, value: f64, count: usize) -> Option<usize> {
     if !(range.start..=range.end).contains(&value) {
         return None;
     }
-    // Halves, because the difference of two finite numbers may be infinite.
+    // Halved, since the difference of two finite numbers may overflow.
     let fraction = (0.5 * value - 0.5 * range.start) / (0.5 * range.end - 0.5 * range.start);
     Some(((fraction * count as f64) as usize).min(count - 1))
 }

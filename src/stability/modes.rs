@@ -1,4 +1,4 @@
-//! What the eigenvalues of a transition matrix say: growth rates, frequencies, damping ratios.
+//! Modes from the eigenvalues of a transition matrix: growth rates, frequencies, damping ratios.
 
 use super::eigenvalues::{EigenvalueError, eigenvalues};
 use nalgebra::{Complex, DMatrix};
@@ -168,7 +168,7 @@ pub fn modes(transition_matrix: &DMatrix<f64>, h: f64) -> Result<Vec<Mode>, Mode
             ModeKind::Pair
         },
     };
-    // The conjugate of each with positive imaginary part is there too.
+    // Its conjugate with positive imaginary part is also in the list.
     let mut modes: Vec<_> = eigenvalues(transition_matrix)?
         .into_iter()
         .filter(|value| value.im >= 0.0)
@@ -215,7 +215,8 @@ mod tests {
             assert_eq!(modes.len(), 1);
             let mode = modes[0];
             assert_eq!(mode.kind(), ModeKind::Pair);
-            // Six nodes are the Padé approximant (5, 5) of e^z, wrong by (5!)²/(10! 11!) |z|¹¹ (T-53); |z| = ωh ≤ 1. Divided by z, as the rates are.
+            // The element with six nodes is the Padé approximant (5, 5) of e^z with the error (5!)²/(10! 11!) |z|¹¹
+            // (T-53), |z| = ωh ≤ 1; divided by z, like the rates.
             let error = 14400.0 / (3_628_800.0 * 39_916_800.0) * (omega * h).powi(10);
             let tolerance = 2.0 * error + 20.0 * f64::EPSILON / (omega * h);
             let damped = omega * (1.0 - xi * xi).sqrt();
@@ -244,7 +245,7 @@ mod tests {
 
     #[test]
     fn frequencies_that_a_step_cannot_tell_apart() {
-        // ω = 8 turns by more than once in h = 1: the principal frequency is 8 − 2π, and 8 is among its aliases.
+        // ω = 8 makes more than one turn in h = 1: the principal frequency is 8 − 2π, and 8 is among its aliases.
         let rotation = |angle: f64| {
             let (sin, cos) = angle.sin_cos();
             DMatrix::from_row_slice(2, 2, &[cos, -sin, sin, cos])
@@ -252,7 +253,7 @@ mod tests {
         let mode = modes(&rotation(8.0), 1.0).unwrap()[0];
         let expected = [8.0 - TAU, 2.0 * TAU - 8.0, 8.0, 3.0 * TAU - 8.0];
         for (found, expected) in mode.frequencies(4).iter().zip(expected) {
-            // Angles from cosines and sines: a few units of round-off of 8.
+            // Angles from sines and cosines: a few ulps of 8.
             assert!((found - expected).abs() < 50.0 * f64::EPSILON);
         }
         assert!(mode.frequency() <= PI);
@@ -272,7 +273,7 @@ mod tests {
         assert_eq!(ratios[..3], [Some(1.0), None, Some(-1.0)]);
         let size = 2.0_f64.ln().hypot(PI);
         assert!((ratios[3].unwrap() - 2.0_f64.ln() / size).abs() < 4.0 * f64::EPSILON);
-        // Backwards in time growth is decay.
+        // Backward in time, growth is decay.
         let back = modes(&diagonal(&[2.0]), -1.0).unwrap()[0];
         assert_eq!(back.growth_rate(), -(2.0_f64.ln()));
     }

@@ -1,21 +1,21 @@
-//! A real Schur form with its largest eigenvalues first.
+//! The real Schur form of a matrix with its largest eigenvalues first.
 
 use super::eigenvalues::eigenvalues_of_two;
 use crate::periodic_schur::{PeriodicSchur, PeriodicSchurError};
 use nalgebra::{Complex, DMatrix};
 
-/// H Z = Z T: Z orthogonal, T upper triangular but for diagonal blocks of two rows.
+/// The decomposition H Z = Z T: Z is orthogonal, T upper triangular except for diagonal blocks of two rows.
 pub(super) struct Ordered {
     vectors: DMatrix<f64>,
     triangular: DMatrix<f64>,
     /// The sizes of the diagonal blocks.
     blocks: Vec<usize>,
-    /// How many columns lead.
+    /// The number of leading columns that are in order.
     kept: usize,
 }
 
 impl Ordered {
-    /// In any order.
+    /// The Schur form in any order.
     pub(super) fn new(matrix: DMatrix<f64>) -> Result<Self, PeriodicSchurError> {
         let schur = PeriodicSchur::new(&[matrix])?;
         let vectors = schur.orthogonal()[0].clone();
@@ -34,7 +34,7 @@ impl Ordered {
         })
     }
 
-    /// Moves the largest eigenvalues to the front, at least so many, fewer only where there are no more.
+    /// Moves the largest eigenvalues to the front until at least `wanted` columns, or all, are in order.
     pub(super) fn lead(&mut self, wanted: usize) {
         let mut leading = 0;
         while self.kept < wanted && leading < self.blocks.len() {
@@ -80,7 +80,8 @@ impl Ordered {
             left - right
         });
         let right = DMatrix::from_fn(p * q, 1, |row, _| t[(first + row % p, second + row / p)]);
-        // Equal eigenvalues need no exchange; to round-off equal ones give an X that is not finite, or huge, and then (−X, 1) is that of T₁₁.
+        // Equal eigenvalues need no exchange. If they are equal up to rounding error, X is infinite or very large, and
+        // (−X, 1) spans the space of T₁₁.
         let Some(x) = sylvester
             .lu()
             .solve(&right)
@@ -116,28 +117,28 @@ impl Ordered {
         largest_of(&self.triangular, 0, self.block(0))
     }
 
-    /// The rows of a diagonal block; none beyond the last.
+    /// The number of rows of a diagonal block; zero beyond the last one.
     pub(super) fn block(&self, k: usize) -> usize {
         self.blocks.get(k).copied().unwrap_or(0)
     }
 
-    /// The columns that lead.
+    /// The number of leading columns that are in order.
     pub(super) fn kept(&self) -> usize {
         self.kept
     }
 
-    /// Z
+    /// The orthogonal matrix Z.
     pub(super) fn vectors(&self) -> &DMatrix<f64> {
         &self.vectors
     }
 
-    /// T
+    /// The block triangular matrix T.
     pub(super) fn triangular(&self) -> &DMatrix<f64> {
         &self.triangular
     }
 }
 
-/// The eigenvalues of a diagonal block of one or two rows, the larger modulus first.
+/// The eigenvalue of larger modulus of a diagonal block of one or two rows.
 pub(super) fn largest_of(block: &DMatrix<f64>, first: usize, rows: usize) -> Complex<f64> {
     if rows == 1 {
         return Complex::new(block[(first, first)], 0.0);

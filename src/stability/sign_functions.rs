@@ -7,12 +7,12 @@
 //! | spectrum closed under λ ↦ 1/λ (symplectic, reversible) | det(A − 1), det(A + 1), ∏ (μᵢ − μⱼ)² with μ = λ + 1/λ, i < j ≤ N |
 //! | any other | det(A − 1), det(A + 1), ∏ (λᵢλⱼ − 1), i < j |
 //!
-//! Round-off is measured, not guessed: a value is trusted if it survives small perturbations of the matrix (see [`Measure::noise`]).
+//! The rounding error of a value is measured by small perturbations of the matrix (see [`Measure::noise`]).
 
 use super::eigenvalues::{balanced, eigenvalues_of_finite, largest_modulus};
 use nalgebra::{Complex, DMatrix};
 
-/// Relative size of the perturbations that measure round-off: what a condensed and solved element may lose, and a margin.
+/// The relative size of these perturbations: the error of a condensed and solved element, with a margin.
 const PERTURBATION: f64 = 256.0 * f64::EPSILON;
 
 /// The functions whose changes of sign mark the changes of stability; see the table of the module.
@@ -25,9 +25,10 @@ pub(super) enum Measure {
 }
 
 impl Measure {
-    /// The measure that suits all of some sample matrices of one size.
+    /// The measure that suits all of several matrices of one size.
     ///
-    /// Judged by the half of them that grow least: round-off hides the structure of the others, and what is not reciprocal shows in all.
+    /// The half of them with the least growth decides: rounding error hides the structure of the others, and a spectrum
+    /// that is not reciprocal is visible in all.
     pub(super) fn suiting(samples: &[DMatrix<f64>]) -> Self {
         let mut calm: Vec<&DMatrix<f64>> = samples.iter().collect();
         calm.sort_by(|a, b| growth(a).total_cmp(&growth(b)));
@@ -43,7 +44,7 @@ impl Measure {
         }
     }
 
-    /// The values of the functions and the spectral radius; none if the eigenvalues do not converge.
+    /// The values of the functions, and the spectral radius; `None` if the eigenvalues do not converge.
     pub(super) fn of(self, a: &DMatrix<f64>) -> Option<(Vec<f64>, f64)> {
         let eigenvalues = eigenvalues_of_finite(a)?;
         let radius = largest_modulus(&eigenvalues);
@@ -71,10 +72,10 @@ impl Measure {
         Some((functions, radius))
     }
 
-    /// How much a quantity changes if every entry of the matrix is perturbed by some ε of its scale (see [`scale_of`]).
+    /// The change of a quantity if every entry of the matrix is perturbed by a few ε of its scale (see [`scale_of`]).
     ///
-    /// First-order bounds would do for determinants, but not for double eigenvalues, which change by √ε or by ε according to whether
-    /// they are defective; trying it out is right for both.
+    /// First-order bounds would suffice for determinants, but not for double eigenvalues, which change by √ε if
+    /// defective and by ε otherwise. Actual perturbations give the right size in both cases.
     pub(super) fn noise(
         a: &DMatrix<f64>,
         scale: &DMatrix<f64>,
@@ -93,7 +94,7 @@ impl Measure {
                 let signed = if random >> 39 & 1 == 0 { size } else { -size };
                 a[(row, column)] + signed * PERTURBATION * scale[(row, column)]
             });
-            // A quantity that is not finite cannot be trusted, and max would drop it.
+            // A value that is not finite is not significant; `max` would ignore NaN.
             let change = quantity(&perturbed).map_or(f64::INFINITY, |other| (other - value).abs());
             if change.is_nan() {
                 f64::INFINITY
@@ -104,7 +105,7 @@ impl Measure {
     }
 }
 
-/// tr |A||A⁻¹|, which does not depend on units; infinite where there is no inverse.
+/// tr |A||A⁻¹|, which does not depend on units; infinite if there is no inverse.
 fn growth(a: &DMatrix<f64>) -> f64 {
     let inverse = a.clone().try_inverse();
     let growth = inverse.map_or(f64::INFINITY, |inverse| (a.abs() * inverse.abs()).trace());
@@ -115,9 +116,10 @@ fn growth(a: &DMatrix<f64>) -> f64 {
     }
 }
 
-/// Whether tr Aᵏ = tr A⁻ᵏ for k = 1..N and det A = 1 to round-off, so that with λ also 1/λ is an eigenvalue.
+/// Whether tr Aᵏ = tr A⁻ᵏ for k = 1..N and det A = 1 up to rounding error, so that with λ also 1/λ is an eigenvalue.
 ///
-/// Measured against tr |A|ᵏ and tr |A||A⁻¹|, which like the spectrum do not depend on the units of momenta and coordinates.
+/// The errors are relative to tr |A|ᵏ and tr |A||A⁻¹|, which like the spectrum do not depend on the units of momenta
+/// and coordinates.
 fn has_reciprocal_spectrum(a: &DMatrix<f64>) -> bool {
     const ROUND_OFF: f64 = 1e-10;
     let size = a.nrows();
@@ -139,7 +141,7 @@ fn has_reciprocal_spectrum(a: &DMatrix<f64>) -> bool {
     if (a.determinant() - 1.0).abs() > ROUND_OFF * condition {
         return false;
     }
-    // Where the map grows by much its entries have lost digits in an element, and the inverse loses them again.
+    // If the map grows strongly, its entries have lost digits in the element, and the inverse loses as many again.
     let round_off = ROUND_OFF.max(1024.0 * f64::EPSILON * condition);
     let (size_of_a, size_of_inverse) = (a.abs(), inverse.abs());
     let (mut power, mut inverse_power) = (a.clone(), inverse.clone());
@@ -170,7 +172,8 @@ fn discriminant_of_two(a: &DMatrix<f64>) -> f64 {
     half_difference * half_difference + a[(0, 1)] * a[(1, 0)]
 }
 
-/// det(A + s): near an eigenvalue −s as accurate as the small entries of A + s are, unlike the characteristic polynomial.
+/// det(A + s). Near an eigenvalue −s it is as accurate as the small entries of A + s, unlike the characteristic
+/// polynomial.
 pub(super) fn shifted_determinant(a: &DMatrix<f64>, shift: f64) -> f64 {
     let mut shifted = a.clone();
     for i in 0..a.nrows() {
@@ -183,7 +186,7 @@ pub(super) fn shifted_determinant(a: &DMatrix<f64>, shift: f64) -> f64 {
     }
 }
 
-/// ∏ (μᵢ − μⱼ)² over the N values μ = λ + 1/λ of a reciprocal spectrum, each of which appears twice and is averaged.
+/// ∏ (μᵢ − μⱼ)² over the N values μ = λ + 1/λ of a reciprocal spectrum; each occurs twice, and the two are averaged.
 fn collisions(eigenvalues: &[Complex<f64>]) -> f64 {
     let mut twice: Vec<Trace> = eigenvalues
         .iter()
@@ -207,10 +210,11 @@ fn collisions(eigenvalues: &[Complex<f64>]) -> f64 {
     })
 }
 
-/// μ = λ + 1/λ as ±2 + (λ ∓ 1)²/λ: near ±1, where the eigenvalues of short steps are, μ itself would be rounded to ±2.
+/// μ = λ + 1/λ in the form ±2 + (λ ∓ 1)²/λ: near ±1, as for the eigenvalues of short steps, μ itself would be rounded
+/// to ±2.
 #[derive(Clone, Copy, Debug)]
 struct Trace {
-    /// 2 or −2.
+    /// The constant 2 or −2.
     nearest: f64,
     beyond: Complex<f64>,
 }
@@ -245,10 +249,11 @@ fn over_pairs<T: Copy>(values: &[T], factor: impl Fn(T, T) -> Complex<f64>) -> f
     product.re
 }
 
-/// The size that round-off in the entries of some neighbouring matrices is relative to.
+/// The scale of the rounding errors in the entries of several neighbouring matrices.
 ///
-/// The largest absolute value of each entry, but at least what amounts to one in balanced units: a small entry may be the difference
-/// of larger terms. Entries that are zero throughout are taken to be exact, so that uncoupled modes stay uncoupled.
+/// It is the largest absolute value of each entry, but at least what corresponds to one in balanced units, since a
+/// small entry may be the difference of larger terms. Entries that are zero in all matrices are taken as exact, so that
+/// uncoupled modes stay uncoupled.
 pub(super) fn scale_of<'a>(
     matrices: impl Iterator<Item = &'a DMatrix<f64>>,
     size: usize,

@@ -1,4 +1,4 @@
-//! Transition matrices of models of either kind of length, and operators for long ones.
+//! Transition matrices for models of either kind of length, and transition operators for long models.
 
 use nalgebra::DMatrix;
 use std::error::Error;
@@ -173,13 +173,14 @@ pub fn dominant(
     found
 }
 
-/// A power of two by which momenta are larger than coordinates: √(|∂p/∂q| / |∂q/∂p|), on one vector each.
+/// The ratio of the scales of momenta and coordinates as a power of two: √(|∂p/∂q| / |∂q/∂p|), estimated with one
+/// vector each.
 #[cfg(feature = "sparse")]
 fn momentum_scale(transition: &family::TransitionOperator) -> f64 {
     let (size, n) = (transition.size(), transition.size() / 2);
     let mut end = vec![0.0; size];
     let mut part = |from_p: bool| -> f64 {
-        // Neighbours in opposite directions, with irregular sizes: what is stiff shows.
+        // Neighbours alternate irregularly in sign and size, so that stiff directions contribute.
         let value = |a: usize| (1.7 * (a * a) as f64).sin();
         let direction: Vec<f64> = (0..size)
             .map(|k| if (k < n) == from_p { value(k % n) } else { 0.0 })

@@ -1,4 +1,4 @@
-//! How fast a linear model moves.
+//! The time scales of a linear model.
 
 use super::eigenvalues::{EigenvalueError, backward_error, eigenvalues};
 use super::sign_functions::Measure;
@@ -12,19 +12,21 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimeScales {
     rates: Vec<Complex<f64>>,
-    /// Rates that are not larger are those of free coordinates.
+    /// The largest rate that is attributed to free coordinates and rounding.
     free: f64,
 }
 
 impl TimeScales {
-    /// Rates that are smaller, relative to the largest, may be those of free coordinates and rounding, which moves double zeros by its square root.
+    /// Rates below this fraction of the largest may belong to free coordinates: rounding splits their double zeros by
+    /// √ε.
     const FREE: f64 = 1e-7;
-    /// They are where perturbations move them by as much as their size over this: four random ones may miss the worst direction.
+    /// They do if the change by perturbations, times this safety factor, reaches their size: four random perturbations
+    /// may miss the worst direction.
     const TRUST: f64 = 4.0;
-    /// Beyond such a ratio of rates a model is called stiff.
+    /// The ratio of rates from which on a model is called stiff.
     const STIFF: f64 = 100.0;
 
-    /// Of ẏ = S y.
+    /// The time scales of ẏ = S y.
     pub(super) fn of(generator: &DMatrix<f64>) -> Result<Self, EigenvalueError> {
         let rates = eigenvalues(generator)?;
         let sizes = ascending(&rates);
@@ -75,14 +77,14 @@ impl TimeScales {
     }
 }
 
-/// The moduli, the smallest first.
+/// The moduli in ascending order.
 fn ascending(rates: &[Complex<f64>]) -> Vec<f64> {
     let mut sizes: Vec<f64> = rates.iter().map(|rate| rate.norm()).collect();
     sizes.sort_by(f64::total_cmp);
     sizes
 }
 
-/// What it means for steps, in one sentence.
+/// Describes the consequences for step sizes in one sentence.
 impl fmt::Display for TimeScales {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (fastest, slowest) = (self.fastest(), self.slowest());
@@ -127,7 +129,7 @@ mod tests {
         assert_eq!(scales.to_string(), "nothing swings, grows or decays");
         model.second.qq = [[0.0, 0.0], [0.0, 4.0]];
         let scales = model.time_scales().expect("eigenvalues");
-        // A frequency of two beside a coordinate that drifts.
+        // A frequency of two, and a free coordinate.
         assert!((scales.fastest() - 2.0).abs() < 1e-14 && (scales.slowest() - 2.0).abs() < 1e-14);
         assert!((scales.newton_from() - 1.0).abs() < 1e-14);
         model.second.qq = [[1e-6, 0.0], [0.0, 4.0]];
@@ -141,12 +143,12 @@ mod tests {
         let mut model = LinearModel::<2> {
             second: Second::ZERO,
         };
-        // An electron that a trap holds along one axis.
+        // An electron in a trap, held along one axis.
         let mass = 9.1e-31;
         model.second.zz = [[1.0 / mass, 0.0], [0.0, 1.0 / mass]];
         model.second.qq = [[4.0 * mass, 0.0], [0.0, 0.0]];
         let scales = model.time_scales().expect("eigenvalues");
-        // Only roundings of the balanced matrix, whose entries are some 2.
+        // The error is the rounding error of the balanced matrix, whose entries are about 2.
         assert!((scales.fastest() - 2.0).abs() < 1e-12, "{scales}");
         assert!((scales.slowest() - 2.0).abs() < 1e-12, "{scales}");
     }

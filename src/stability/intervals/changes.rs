@@ -1,4 +1,4 @@
-//! Where stability changes: roots of the functions, and the verdict between them.
+//! The changes of stability: the roots of the functions, and the classification of the parts between them.
 
 use super::IntervalError;
 use super::search::{Failure, SHORTEST, SPLIT, Sample, Search};
@@ -6,41 +6,41 @@ use crate::stability::chebyshev::bracketed_root;
 use std::ops::Range;
 use std::rc::Rc;
 
-/// An excess of the spectral radius below this is not called unstable.
+/// Where the spectral radius exceeds one by less than this, the method is not called unstable.
 const LEAST_EXCESS: f64 = 1e-10;
-/// Roots closer than this, relative to their position, are one.
+/// Roots closer than this, relative to their position, are merged.
 const SAME_ROOT: f64 = 1e-12;
 
-/// Two changes nearer than this, relative to their position, are round-off that came and went.
+/// Two changes closer than this, relative to their position, are an artefact of rounding.
 const SLIVER: f64 = 64.0 * f64::EPSILON;
 
-/// A place where stability may change.
+/// A point where stability may change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Candidate {
     at: f64,
-    /// Whether it is the root of a function, and so accurate; otherwise a function only touches zero or is unresolved there.
+    /// True for a root of a function, which is accurate; otherwise a function only touches zero or is unresolved there.
     is_root: bool,
 }
 
-/// What was found out about a range.
+/// The result for a range.
 pub(super) struct Verdict {
     pub(super) unstable_at_start: bool,
     pub(super) changes: Vec<f64>,
 }
 
-/// Why the polishing of a root stopped.
+/// Why the refinement of a root stopped.
 enum Stop {
-    /// The function grows between the ends of the bracket: it changes its sign through infinity.
+    /// The function grows inside the bracket: it changes its sign at a pole.
     Pole,
     Failed(Failure),
 }
 
 impl Search<'_> {
-    /// Classifies the pieces between all candidates, and tells where the class changes.
+    /// Classifies the parts between all candidates, and collects the points where the class changes.
     pub(super) fn verdict(&mut self, range: &Range<f64>) -> Result<Verdict, Failure> {
-        /// Interior points of a piece whose majority decides: one may hit a tangency.
+        /// Interior points of a part, which decide by majority: one of them may hit a tangency.
         const INTERIOR: [f64; 3] = [0.3, 0.5, 0.75];
-        /// Samples closer than this to a candidate, relative to the piece, say nothing.
+        /// Samples closer than this to a candidate, relative to the part, are ignored.
         const MARGIN: f64 = 1e-3;
         let candidates = self.candidates()?;
         let (Some(first), Some(last)) = (self.samples.first(), self.samples.last()) else {
@@ -112,7 +112,7 @@ impl Search<'_> {
             });
         }
         let unstable_at_start = probes.first().is_some_and(|&(_, unstable)| unstable);
-        // The probes are needed once more, for the largest radius.
+        // The samples are needed again for the largest radius.
         self.samples
             .extend(probes.into_iter().map(|(sample, _)| sample));
         self.samples.sort_by(|a, b| a.at.total_cmp(&b.at));
@@ -124,7 +124,7 @@ impl Search<'_> {
         })
     }
 
-    /// Where the class changes between two samples, for the ends at which no function changes its sign.
+    /// Finds by bisection where the class changes between two samples, where no function changes its sign.
     fn bisect(
         &mut self,
         left: &Sample,
@@ -146,7 +146,7 @@ impl Search<'_> {
         }
     }
 
-    /// All roots and touching points, ascending, no two at one place.
+    /// All roots and touching points, ascending and distinct.
     fn candidates(&mut self) -> Result<Vec<Candidate>, Failure> {
         let count = self
             .samples
@@ -160,7 +160,7 @@ impl Search<'_> {
         for function in 0..count {
             for (start, end) in self.brackets(function) {
                 candidates.push(if start.0 < 0.0 && end.0 > 0.0 {
-                    // Not looked at more closely: at zero the matrix may not exist.
+                    // Not refined: at zero the matrix may not exist.
                     Candidate {
                         at: 0.0,
                         is_root: true,
@@ -181,7 +181,7 @@ impl Search<'_> {
         Ok(candidates)
     }
 
-    /// Neighbouring samples between which a function changes its sign, ignoring values that are round-off.
+    /// Successive samples between which a function changes its sign; values within rounding error are ignored.
     fn brackets(&self, function: usize) -> Vec<((f64, f64), (f64, f64))> {
         let is_trusted = |sample: &Sample| {
             let value = sample.functions[function].abs();
@@ -208,7 +208,7 @@ impl Search<'_> {
         brackets
     }
 
-    /// The root of a function in a bracket, or the pole through which it changes its sign.
+    /// The root of a function in a bracket, or the pole at which it changes its sign.
     fn polish(
         &mut self,
         function: usize,
@@ -241,7 +241,7 @@ impl Search<'_> {
             Err(Stop::Failed(error)) => return Err(error),
             Err(Stop::Pole) => {}
         }
-        // No closer than needed: at the pole itself there is no matrix.
+        // Not to full precision: at the pole itself there is no matrix.
         let (mut low, mut high) = (start.0, end.0);
         while high - low > SHORTEST * low.abs().max(high.abs()) {
             let middle = low + SPLIT * (high - low);
@@ -258,10 +258,10 @@ impl Search<'_> {
     }
 }
 
-/// Changes in ascending order without pairs that are as near as a few units in the last place.
+/// The ascending changes without pairs that are only a few ulps apart.
 ///
-/// Double eigenvalues of free coordinates, which round-off splits, and values near a pole give such pairs. The excess of a true radius is of the
-/// order of the width of its interval, so nothing is lost.
+/// Such pairs come from rounding: from double eigenvalues of free coordinates, and from values near a pole. Since a
+/// true spectral radius exceeds one by about the width of its interval, nothing is lost.
 fn without_slivers(changes: Vec<f64>) -> Vec<f64> {
     let mut kept: Vec<f64> = Vec::with_capacity(changes.len());
     for at in changes {

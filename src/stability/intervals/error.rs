@@ -1,4 +1,4 @@
-//! Why there are no intervals.
+//! The errors of the search for intervals.
 
 use std::error::Error;
 use std::fmt;

@@ -1,4 +1,5 @@
-//! Pieces of the range, small enough for polynomials, and what the polynomials show.
+//! The division of the range into pieces on which polynomials resolve the functions, and the samples at their critical
+//! points.
 
 use super::error::IntervalError;
 use super::search::{Failure, Matrix, SHORTEST, SPLIT, Sample, Search};
@@ -7,33 +8,36 @@ use crate::stability::sign_functions::{Measure, scale_of};
 use std::ops::Range;
 use std::rc::Rc;
 
-/// Truncation error of an interpolant that counts as resolved, relative to its largest value.
+/// The relative truncation error at which an interpolant is resolved.
 const RESOLVED: f64 = 1e-12;
-/// Relative error below which splitting stops as soon as it does not help.
+/// The relative error below which a piece is no longer split if splitting does not reduce it.
 const STAGNANT: f64 = 1e-7;
-/// A critical value this small, relative to the largest value of its piece, is looked at through a smaller piece.
+/// A critical value this small, relative to the largest value of its piece, is examined in a smaller piece.
 const MAGNIFY_BELOW: f64 = 1e-7;
-/// Length of the smaller piece.
+/// The length of the smaller piece, relative to the piece.
 const MAGNIFICATION: f64 = 1e-2;
-/// How often: 10⁻² to this power is below what a double can separate in a piece that lies between h and 2h.
+/// The number of successive magnifications: 10⁻² to this power is below the resolution of `f64` in a piece between h
+/// and 2h.
 const MAGNIFICATIONS: u32 = 5;
-/// Pieces near zero begin at this part of the far end.
+/// The start of the first piece next to zero, relative to the far end of the range.
 const NEAREST_ZERO: f64 = 1.0 / (1_u64 << 40) as f64;
-/// The first pieces grow by this factor. Not 2, so that no piece ends at a round number, where poles like to be.
+/// The ratio of the lengths of successive first pieces. Not 2, so that no piece ends at a round number, where poles
+/// often are.
 const GROWTH: f64 = 1.93;
 
-/// A piece of the range that waits for its interpolation.
+/// A piece of the range that is still to be interpolated.
 #[derive(Clone, Debug)]
 pub(super) struct Piece {
     start: f64,
     end: f64,
-    /// How often magnified.
+    /// The number of magnifications.
     zoom: u32,
-    /// The relative errors of the interpolants on the piece it was split from.
+    /// The relative errors of the interpolants on the piece from which it was split.
     before: Vec<f64>,
 }
 
-/// Pieces that grow with the distance from zero, on both sides of it, so that each holds a moderate ratio of the parameter.
+/// Pieces that grow with the distance from zero, on both sides, so that the parameter varies by a moderate ratio in
+/// each.
 fn first(start: f64, end: f64) -> Vec<Piece> {
     let nearest = NEAREST_ZERO * start.abs().max(end.abs());
     let mut pieces = Vec::new();
@@ -45,7 +49,7 @@ fn first(start: f64, end: f64) -> Vec<Piece> {
             } else {
                 GROWTH * near
             };
-            // A last piece of its own would be short.
+            // A separate last piece would be short.
             let next = if next * (1.0 + 1e-2) >= far {
                 far
             } else {
@@ -74,13 +78,13 @@ fn first(start: f64, end: f64) -> Vec<Piece> {
     pieces
 }
 
-/// A function on a piece.
+/// The interpolant of a function on a piece.
 struct Interpolant {
     series: Series,
     largest: f64,
-    /// Truncation or round-off, whichever is larger.
+    /// The truncation error or the rounding error, whichever is larger.
     error: f64,
-    /// The estimated error relative to the largest value.
+    /// The error relative to the largest value.
     relative: f64,
     is_resolved: bool,
 }
@@ -93,7 +97,7 @@ impl<'m> Search<'m> {
             return Err(IntervalError::Range { start, end });
         }
         let mut search = Self::new(matrix);
-        // Irregular fractions, denser near the start, where transition matrices have their structure.
+        // Irregular fractions, denser near the start, where transition matrices vary most.
         const PROBES: [f64; 6] = [0.0023, 0.0171, 0.0673, 0.2137, 0.5519, 0.9043];
         let probes = PROBES
             .iter()
@@ -111,14 +115,15 @@ impl<'m> Search<'m> {
 }
 
 impl Search<'_> {
-    /// Interpolates all functions on a piece; adds samples at the points and at the critical points that matter, or smaller pieces.
+    /// Interpolates all functions on a piece; adds samples at the Chebyshev points and the relevant critical points, or
+    /// splits the piece.
     fn resolve(
         &mut self,
         piece: Piece,
         range: &Range<f64>,
         waiting: &mut Vec<Piece>,
     ) -> Result<(), Failure> {
-        /// Where the interpolant is compared with the function itself.
+        /// The points at which the interpolant is compared with the function.
         const CHECKS: [f64; 2] = [0.1371, 0.8193];
         let Piece {
             start,
@@ -192,7 +197,7 @@ impl Search<'_> {
             for at in interpolant.series.critical_points(interpolant.error) {
                 let value = interpolant.series.evaluate(at);
                 let is_small = value.abs() <= MAGNIFY_BELOW * interpolant.largest;
-                // A critical value with the sign of its surroundings, and far from zero, separates no roots.
+                // A critical value of the same sign as its neighbours, and far from zero, does not separate roots.
                 let after = samples[..=DEGREE]
                     .partition_point(|sample| sample.at <= at)
                     .clamp(1, DEGREE);
@@ -206,7 +211,7 @@ impl Search<'_> {
                     is_magnified = true;
                     let half = 0.5 * MAGNIFICATION * width;
                     let zoomed = ((at - half).max(range.start), (at + half).min(range.end));
-                    // Not over zero, where the matrix may not exist.
+                    // Not across zero, where the matrix may not exist.
                     if zoomed.0 * zoomed.1 > 0.0 && zoomed.0 < zoomed.1 {
                         waiting.push(Piece {
                             start: zoomed.0,
@@ -227,10 +232,11 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The interpolant of a function through the first samples, compared with it at the last ones.
+    /// The interpolant of a function through the first samples, compared with the function at the last ones.
     ///
-    /// `before` is the relative error on a piece twice as long. Halving the piece divides a truncation error by thousands; an error
-    /// that does not fall is round-off in the matrix itself, larger than assumed (near a pole, say), and no splitting can help.
+    /// `before` is the relative error on a piece twice as long. Halving the piece reduces a truncation error by a
+    /// factor of thousands. An error that does not decrease is rounding error of the matrix, larger than estimated
+    /// (near a pole, for example), and splitting does not help.
     fn interpolant(&self, samples: &[Sample], function: usize, before: f64) -> Interpolant {
         let values: [f64; DEGREE + 1] = std::array::from_fn(|j| samples[j].functions[function]);
         let series = Series::through(samples[0].at, samples[DEGREE].at, &values);
@@ -240,7 +246,8 @@ impl Search<'_> {
         let difference = samples[DEGREE + 1..]
             .iter()
             .fold(series.tail(), |most, sample| {
-                // The check may be ten times worse than the tail: a rounding error counts fully, the points average.
+                // The error at the check points may be ten times the tail, since it contains a full rounding error,
+                // while the coefficients average over the points.
                 most.max(0.1 * (series.evaluate(sample.at) - sample.functions[function]).abs())
             });
         let relative = if largest > 0.0 {

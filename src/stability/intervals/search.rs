@@ -1,54 +1,56 @@
-//! Sampling a matrix over a range of its parameter.
+//! Evaluates the matrix and the functions over a range of the parameter.
 
 use super::error::IntervalError;
 use crate::stability::sign_functions::{Measure, shifted_determinant};
 use nalgebra::DMatrix;
 use std::rc::Rc;
 
-/// A quantity is trusted at this many times the change under a perturbation: four random ones may miss the worst direction.
+/// A value is significant above this many times its change under perturbations: four random ones may miss the worst
+/// direction.
 const TRUST: f64 = 4.0;
-/// A piece is not split below this length relative to its position: a pole sits there.
+/// The shortest piece, relative to its position; it contains a pole.
 pub(super) const SHORTEST: f64 = 1e-10;
-/// Where a piece is split, for the same reason not at ½.
+/// The fraction at which a piece is split; not ½, to avoid poles at round numbers.
 pub(super) const SPLIT: f64 = 0.4957;
-/// The budget: three modes over some fifty periods, with all their crossings, need a sixth of it.
+/// The largest number of evaluations. Three modes over about fifty periods, with all their crossings, need a sixth of
+/// it.
 const MOST_EVALUATIONS: usize = 200_000;
 
-/// What is known at one value of the parameter.
+/// The functions at one value of the parameter.
 #[derive(Clone, Debug)]
 pub(super) struct Sample {
     pub(super) at: f64,
     pub(super) matrix: DMatrix<f64>,
-    /// What round-off in each entry is relative to, in the piece around.
+    /// The scale of the rounding errors of each entry, over the surrounding piece.
     pub(super) scale: Rc<DMatrix<f64>>,
     pub(super) functions: Vec<f64>,
     pub(super) radius: f64,
 }
 
-/// The matrix could not be computed: the error stays with who computes it.
+/// The matrix could not be computed; its error is kept outside the search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Withheld;
 
-/// Why a search ends early.
+/// The error that ends a search early.
 pub(super) type Failure = IntervalError<Withheld>;
 
-/// The matrix at a value of the parameter: a pointer to a function, so that the search is compiled once and not for every model.
+/// The matrix as a function of the parameter. A trait object, so that the search is compiled only once.
 pub(super) type Matrix<'m> = &'m mut dyn FnMut(f64) -> Result<DMatrix<f64>, Withheld>;
 
-/// The search through one range.
+/// The search over one range.
 pub(super) struct Search<'m> {
     matrix: Matrix<'m>,
     pub(super) measure: Measure,
     pub(super) size: usize,
     evaluations: usize,
-    /// Ascending once the range is resolved.
+    /// In ascending order once the range is resolved.
     pub(super) samples: Vec<Sample>,
-    /// Where a function touches zero, or is unresolved.
+    /// The points where a function touches zero or is unresolved.
     pub(super) touches: Vec<f64>,
 }
 
 impl<'m> Search<'m> {
-    /// Nothing sampled yet.
+    /// A search without samples.
     pub(super) fn new(matrix: Matrix<'m>) -> Self {
         Self {
             matrix,
@@ -95,7 +97,7 @@ impl<'m> Search<'m> {
         })
     }
 
-    /// How far the value of a function at a sample can be wrong.
+    /// The error bound of the value of a function at a sample.
     pub(super) fn noise_of(&self, sample: &Sample, function: usize) -> f64 {
         let measure = self.measure;
         let one = |a: &DMatrix<f64>| match measure {
@@ -106,7 +108,7 @@ impl<'m> Search<'m> {
         TRUST * Measure::noise(&sample.matrix, &sample.scale, one)
     }
 
-    /// Whether the spectral radius exceeds one by more than `least`; none if by no more than round-off.
+    /// Whether the spectral radius exceeds one by more than `least`; `None` if the excess is within rounding error.
     pub(super) fn is_unstable(&self, sample: &Sample, least: f64) -> Option<bool> {
         let excess = sample.radius - 1.0;
         let measure = self.measure;

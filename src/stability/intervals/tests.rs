@@ -1,4 +1,4 @@
-//! Closed forms of elements and other maps whose intervals are known.
+//! Elements in closed form, and other maps with known intervals.
 
 use super::*;
 use std::convert::Infallible;
@@ -59,7 +59,7 @@ fn beside(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// The same map in rotated and rescaled coordinates: no entry is zero, units differ by 10³.
+/// The same map in rotated and rescaled coordinates: no entry is zero, and units differ by 10³.
 fn mixed(a: &DMatrix<f64>) -> DMatrix<f64> {
     let (sin, cos) = 0.6_f64.sin_cos();
     let rotation = two(cos, -sin, sin, cos);
@@ -90,7 +90,7 @@ fn check(
     let found = unstable_intervals_of(exact(matrix), range).expect("the matrix is smooth");
     assert_eq!(found.len(), expected.len(), "{found:#?}");
     for (interval, &(start, end)) in found.iter().zip(expected) {
-        // Ten digits, the promise of the reference table; most ends are right to fifteen.
+        // Ten digits, as the reference table guarantees; most ends are accurate to fifteen.
         assert!(
             (interval.start - start).abs() <= 1e-10 * start,
             "{interval:?}: start {start}"
@@ -127,7 +127,7 @@ const BUBBLES: [&[(f64, f64)]; 4] = [
         (19.499618752922665, 1e3),
     ],
 ];
-/// (ρ, spectral radius) of the finite ones.
+/// (ρ, spectral radius) at the maximum of each bounded interval.
 const WORST: [&[(f64, f64)]; 4] = [
     &[],
     &[(3.3112897574651194, 1.129817690854696)],
@@ -148,7 +148,8 @@ fn every_bubble_of_the_primal_elements() {
         let found = check(|h| primal(nodes, 1.0, h), 0.0..1e3, BUBBLES[i]);
         for (interval, &(worst, radius)) in found.iter().zip(WORST[i]) {
             assert!((interval.radius - radius).abs() <= 1e-13, "{interval:?}");
-            // A maximum is flat: the square root of round-off over the width.
+            // At the flat maximum the position is known to the square root of the rounding error, relative to the
+            // width.
             assert!(
                 (interval.worst - worst).abs() <= 1e-7 * worst,
                 "{interval:?}"
@@ -212,7 +213,7 @@ fn bubbles_of_two_modes_merge_where_they_overlap() {
 
 #[test]
 fn bubbles_of_identical_modes() {
-    // Every function has only double zeros: nothing changes its sign.
+    // Every function has only double zeros and never changes its sign.
     let expected = [
         (BUBBLES[3][0].0, BUBBLES[3][0].1),
         (BUBBLES[3][1].0, BUBBLES[3][1].1),
@@ -236,7 +237,8 @@ fn a_free_mode_beside_a_bubble() {
 
 #[test]
 fn narrow_bubbles() {
-    // a₁₂ and a₂₁ vanish at 3 and 3 + w, the determinant is one: the bubble lies between, highest in the middle.
+    // a₁₂ and a₂₁ vanish at 3 and 3 + w, and the determinant is one: the interval lies between, with its maximum in the
+    // middle.
     for width in [1e-2, 1e-5, 1e-8] {
         let start = 3.0;
         let bubble = move |h: f64| {
@@ -246,7 +248,7 @@ fn narrow_bubbles() {
         };
         let found = unstable_intervals_of(exact(bubble), 2.5..3.5).expect("smooth");
         assert_eq!(found.len(), 1, "{found:?}");
-        // The ends: round-off of 3 + w − h.
+        // The error of the ends is the rounding error of 3 + w − h.
         assert!((found[0].start - start).abs() <= 4.0 * f64::EPSILON * start);
         assert!((found[0].end - start - width).abs() <= 4.0 * f64::EPSILON * start);
         let radius = 0.5 * width + (1.0 + 0.25 * width * width).sqrt();
@@ -256,7 +258,7 @@ fn narrow_bubbles() {
 
 #[test]
 fn touching_is_not_unstable() {
-    // Mixed, two nodes (48): the trapezoidal rule.
+    // The mixed element with two nodes (48): the trapezoidal rule.
     let trapezoidal = |h: f64| {
         let d = 4.0 + h * h;
         two(
@@ -267,11 +269,11 @@ fn touching_is_not_unstable() {
         )
     };
     check(trapezoidal, 0.0..1e3, &[]);
-    // The exact flow passes −1 and 1 at all multiples of π, the modes cross in between.
+    // The exact flow has eigenvalues −1 and 1 at all multiples of π, and the modes cross in between.
     let flow = |h: f64| two(h.cos(), -h.sin(), h.sin(), h.cos());
     check(flow, 0.0..100.0, &[]);
     check(|h| mixed(&beside(&flow(h), &flow(1.7 * h))), 0.0..50.0, &[]);
-    // A defective touch: a₂₁ has a double zero.
+    // A defective double eigenvalue: a₂₁ has a double zero.
     let touch = |h: f64| {
         let b = -(h - 1.3) * (h - 1.3) / (3.0 + h * h);
         let diagonal = -(1.0 + b).sqrt();
@@ -282,8 +284,8 @@ fn touching_is_not_unstable() {
 
 #[test]
 fn collisions_on_the_circle() {
-    // A top: H = ½p² + Ω (p₁q₂ − p₂q₁) + ½(Ω² − 1)q² has eigenvalues ±i(Ω ± √(Ω² − 1)): its modes, of opposite signature,
-    // collide at Ω = 1.
+    // A spinning top: H = ½p² + Ω (p₁q₂ − p₂q₁) + ½(Ω² − 1)q² has the eigenvalues ±i(Ω ± √(Ω² − 1)); its modes, of
+    // opposite signature, collide at Ω = 1.
     let spin = |omega: f64| {
         let s = DMatrix::from_row_slice(
             4,
@@ -307,7 +309,7 @@ fn collisions_on_the_circle() {
                 0.0,
             ],
         );
-        // The Cayley map of a Hamiltonian matrix is symplectic and keeps imaginary spectra on the circle.
+        // The Cayley map of a Hamiltonian matrix is symplectic and maps imaginary eigenvalues to the unit circle.
         let half = s * 0.05;
         let one = DMatrix::<f64>::identity(4, 4);
         (&one - &half).try_inverse().expect("regular") * (&one + &half)
@@ -332,25 +334,25 @@ fn maps_with_damping() {
         0.0..10.0,
         &[(2.0 / (2.0 + 3.0_f64.sqrt()), 10.0)],
     );
-    // Two of them: the first to become unstable decides.
+    // Two oscillators: the first to become unstable decides.
     check(
         |h| mixed(&beside(&damped(0.2)(h), &damped(0.1)(1.3 * h))),
         0.0..10.0,
         &[(0.2 / 1.3, 10.0)],
     );
-    // One of them twice: double zeros only.
+    // The same oscillator twice: double zeros only.
     check(
         |h| mixed(&beside(&damped(0.2)(h), &damped(0.2)(h))),
         0.0..10.0,
         &[(0.4, 10.0)],
     );
-    // One unknown: forward Euler of decay.
+    // One unknown: explicit Euler for exponential decay.
     check(
         |h| DMatrix::from_element(1, 1, 1.0 - h),
         0.0..10.0,
         &[(2.0, 10.0)],
     );
-    // Three.
+    // Three unknowns.
     let three = |h: f64| {
         DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![
             1.0 - h,
@@ -375,7 +377,7 @@ fn poles_are_infinite_radii() {
     let found = check(pole, 0.5..10.0, &[(0.5, 10.0)]);
     assert_eq!(found[0].radius, f64::INFINITY);
     assert!((found[0].worst - 2.0).abs() < 1e-8);
-    // A pole through which nothing changes its sign; the radius exceeds one from ½ on.
+    // A pole at which no function changes its sign; the radius exceeds one from ½ on.
     let double = |h: f64| DMatrix::from_element(1, 1, ((1.0 + h) / (2.0 - h)).powi(2));
     let found = check(double, 0.1..10.0, &[(0.5, 10.0)]);
     assert_eq!(found[0].radius, f64::INFINITY);

@@ -4,25 +4,25 @@ use super::search::{Failure, Search};
 use super::{IntervalError, UnstableInterval};
 use std::ops::Range;
 
-/// A spectral radius this large is called infinite: a pole, approached as far as the maximum of a smooth function would be.
+/// From this spectral radius on the maximum is a pole and reported as infinite.
 const POLE: f64 = 1e8;
 
 impl Search<'_> {
-    /// The largest spectral radius of an unstable interval: around the best samples by golden section.
+    /// The largest spectral radius in an unstable interval, by golden-section search around the largest samples.
     pub(super) fn worst_in(
         &mut self,
         start: f64,
         end: f64,
         range: &Range<f64>,
     ) -> Result<UnstableInterval, Failure> {
-        /// Local maxima among the samples that are refined.
+        /// The number of local maxima among the samples that are refined.
         const STARTS: usize = 3;
         let inside = self
             .samples
             .iter()
             .filter(|sample| start <= sample.at && sample.at <= end);
         let mut known: Vec<(f64, f64)> = inside.map(|sample| (sample.at, sample.radius)).collect();
-        // At an end inside the range the radius is one.
+        // At an end inside the range the spectral radius is one.
         if start != range.start {
             known.insert(0, (start, 1.0));
         }
@@ -52,7 +52,7 @@ impl Search<'_> {
         })
     }
 
-    /// A local maximum (h, ρ) by golden section, to the square root of round-off in h.
+    /// A local maximum (h, ρ) by golden-section search; h is accurate to the square root of the rounding error.
     fn highest_between(&mut self, mut low: f64, mut high: f64) -> Result<(f64, f64), Failure> {
         const GOLDEN: f64 = 0.381_966_011_250_105_1;
         let tolerance = f64::EPSILON.sqrt() * (high - low);

@@ -1,4 +1,4 @@
-//! What can go wrong with a map, and at a point of it.
+//! The errors of a stability map and of its points.
 
 use crate::numbers::Short;
 use crate::stability::eigenvalues::EigenvalueError;

@@ -1,4 +1,4 @@
-//! Maps of the largest Floquet multiplier about rest.
+//! Maps of the largest Floquet multiplier about the rest state.
 
 use super::{FloquetError, MapError, MapPlan, StabilityMap};
 use crate::numbers::{larger, largest};
@@ -73,7 +73,7 @@ impl MapPlan {
     }
 }
 
-/// Ends with the first increment: the solution of the equations linearised at rest.
+/// Stops after the first increment, which solves the equations linearised at rest.
 const ONCE: Control = Control {
     tolerance: f64::INFINITY,
     max_iterations: 1,
@@ -92,17 +92,17 @@ impl Period {
     }
 }
 
-/// The memory in which monodromy matrices are computed, one after the other.
+/// The workspace of monodromy matrices.
 struct Monodromy<'a, const N: usize> {
     tables: &'a SchemeTable,
     numbers: Vec<f64>,
     pivots: Vec<usize>,
     extra: Vec<f64>,
-    /// The transition matrix of one element, by rows.
+    /// The transition matrix of one element, row by row.
     factor: Vec<f64>,
-    /// The product so far, by rows.
+    /// The product of the matrices so far, row by row.
     product: Vec<f64>,
-    /// One column of it.
+    /// One column of the product.
     column: Vec<f64>,
 }
 
@@ -120,7 +120,7 @@ impl<'a, const N: usize> Monodromy<'a, N> {
         }
     }
 
-    /// max |λ(Φ)| of a model.
+    /// The largest multiplier, max |λ(Φ)|, of a model.
     fn radius<M: Model<N>>(&mut self, model: &M, period: Period) -> Result<f64, FloquetError> {
         self.compute(model, period)?;
         let matrix = DMatrix::from_row_slice(2 * N, 2 * N, &self.product);
@@ -154,7 +154,8 @@ impl<'a, const N: usize> Monodromy<'a, N> {
             };
             let mut advanced = method.advance(&mut memory, self.workspace(), interval, &mut state);
             if let Err(StepError::NewtonStalled { .. } | StepError::Unproven { .. }) = advanced {
-                // Roundings of forces that hold each other may push it to and fro for ever. How far they push is told by one solution.
+                // Rounding errors of forces in balance may prevent convergence. A single linear solution then shows
+                // their effect.
                 let again = once.advance(&mut memory, self.workspace(), interval, &mut state);
                 advanced = again.or(advanced);
             }
@@ -192,7 +193,7 @@ impl<'a, const N: usize> Monodromy<'a, N> {
         }
     }
 
-    /// product ← factor · product
+    /// Multiplies from the left: product ← factor · product.
     fn multiply(&mut self) {
         let size = 2 * N;
         for j in 0..size {
@@ -206,9 +207,10 @@ impl<'a, const N: usize> Monodromy<'a, N> {
     }
 }
 
-/// Refuses an element that moved what was at rest by more than rounding does to coordinates of order one.
+/// Refuses the rest state if an element moves it by more than the rounding error of coordinates of order one.
 ///
-/// Momenta have units of their own: of them counts what they move in one more element, by its transition matrix.
+/// Momenta have other units: they are measured by the displacements that they cause in another element, by its
+/// transition matrix.
 fn check_rest<const N: usize>(
     element: usize,
     state: &State<N>,

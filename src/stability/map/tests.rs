@@ -56,7 +56,7 @@ fn failures_are_counted_and_have_no_value() {
         (3, 0, 3.5, -0.5)
     );
     assert!(matches!(first.error, PointError::NotFinite { value } if value.is_nan()));
-    // Of the five that are left, at 0.5, 1.5 and 2.5 and at 2.5 and 3.5.
+    // The five remaining points are x = 0.5, 1.5, 2.5 in one row and x = 2.5, 3.5 in the other.
     assert_eq!(map.fraction_unstable(), Some(0.8));
 
     let none = plan().run(|_, _| Err::<f64, _>("all bad")).unwrap();
