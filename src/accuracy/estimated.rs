@@ -1,4 +1,4 @@
-//! A motion with its error.
+//! A motion together with its error estimate.
 
 use crate::numbers::larger;
 use std::fmt;
@@ -13,7 +13,7 @@ use tfe_runtime::{Element, Solve, Statistics};
 pub struct Estimated<T> {
     motion: T,
     times: Vec<f64>,
-    /// Of each kind at each time: coordinates, momenta, one output after the other.
+    /// One list for the coordinates, one for the momenta and one for each output; each with an error for every time.
     errors: Vec<Vec<f64>>,
     outputs: Vec<String>,
     picked: Option<Picked>,
@@ -58,7 +58,7 @@ impl<T> Estimated<T> {
     /// model declares no output of this name.
     pub fn error_estimate_of(&self, output: &str) -> Option<f64> {
         let at = self.outputs.iter().position(|name| name == output)?;
-        // After coordinates and momenta.
+        // The outputs follow the coordinates and the momenta.
         let errors = self.errors.get(2 + at)?;
         Some(errors.iter().copied().fold(0.0, larger))
     }

@@ -1,27 +1,28 @@
-//! Where steps are long and where they are short.
+//! The density of steps along a motion, from which graded meshes are made.
 
-/// Steps per unit of time ρ(t) > 0, linear between times, and their number up to a time (T-102):
+/// The number of steps per unit of time, ρ(t) > 0, piecewise linear, and its integral (T-102):
 ///
 /// ```text
 /// s(t) = ∫ ρ dt from the start to t ,     s(t_{k+1}) − s(t_k) = c
 /// ```
 ///
-/// A factor c makes a mesh; of two of them one is the other refined by the same factor everywhere.
+/// A factor c defines a mesh. Of the meshes with factors c and c/2, the second divides every element of the first in
+/// two.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Grading {
     start: f64,
-    /// 1, or −1 for a run backwards.
+    /// 1, or −1 in backward integration.
     direction: f64,
-    /// Since the start, increasing.
+    /// Measured from the start, increasing.
     times: Vec<f64>,
     rates: Vec<f64>,
-    /// s at these times.
+    /// The values of s at these times.
     sums: Vec<f64>,
 }
 
 impl Grading {
-    /// From the times of a mesh, in the order of the run, and the step that is to be taken in each of its elements: at a time the shorter one of both
-    /// sides. `None` where that is no mesh, or a step is no positive number.
+    /// Takes the nodes of a mesh, in the order of the run, and the step that each of its elements asks for; at a node
+    /// the shorter one of its two sides counts. `None` if the nodes form no mesh, or a step is not positive and finite.
     pub(crate) fn new(nodes: &[f64], steps: &[f64]) -> Option<Self> {
         let (start, end) = (*nodes.first()?, *nodes.last()?);
         let direction = (end - start).signum();
@@ -50,7 +51,7 @@ impl Grading {
         })
     }
 
-    /// s(t): how many steps there are up to a time.
+    /// s(t), the number of steps up to a time.
     pub(crate) fn sum(&self, t: f64) -> f64 {
         let time = (self.direction * (t - self.start)).max(0.0);
         let k = self.piece(&self.times, time);
@@ -59,7 +60,7 @@ impl Grading {
         self.sums[k] + x * (self.rates[k] + 0.5 * bend * x)
     }
 
-    /// The time at which there are so many steps.
+    /// The time at which s has a given value.
     pub(crate) fn time(&self, sum: f64) -> f64 {
         let k = self.piece(&self.sums, sum);
         let (rate, rest) = (self.rates[k], sum - self.sums[k]);
@@ -68,9 +69,9 @@ impl Grading {
         self.start + self.direction * (self.times[k] + x)
     }
 
-    /// The nodes after `from` up to `to`, in at most `step` of s each, all equal.
+    /// The nodes after `from` up to `to`, equally spaced in s, at most `step` apart.
     pub(crate) fn nodes(&self, from: f64, to: f64, step: f64) -> Vec<f64> {
-        /// Beyond it a run would take years.
+        /// The largest number of steps; a longer run would take years.
         const MOST: f64 = 1e9;
         let (first, last) = (self.sum(from), self.sum(to));
         let parts = ((last - first) / step).ceil().clamp(1.0, MOST);
@@ -79,7 +80,7 @@ impl Grading {
             self.between(from, t, to)
         });
         let mut nodes: Vec<f64> = inner.chain([to]).collect();
-        // Steps below the spacing of floating-point numbers are none.
+        // Steps below the resolution of floating-point numbers are dropped.
         nodes.dedup();
         nodes.retain(|t| *t != from);
         nodes
@@ -93,13 +94,13 @@ impl Grading {
         }
     }
 
-    /// The piece of a table in which a number lies.
+    /// The interval of a table that contains a number.
     fn piece(&self, table: &[f64], number: f64) -> usize {
         let after = table.partition_point(|entry| *entry <= number);
         after.saturating_sub(1).min(self.times.len() - 2)
     }
 
-    /// dρ/dt in a piece.
+    /// dρ/dt in an interval.
     fn bend(&self, k: usize) -> f64 {
         (self.rates[k + 1] - self.rates[k]) / (self.times[k + 1] - self.times[k])
     }
@@ -113,7 +114,7 @@ mod tests {
         Grading::new(&[1.0, 2.0, 2.5, 2.51, 4.0], &[1.0, 0.5, 1e-3, 0.7]).expect("a mesh")
     }
 
-    /// s and its inverse undo each other, forwards and backwards.
+    /// s and its inverse are consistent, forward and backward in time.
     #[test]
     fn sums_and_times_belong_together() {
         let backwards = Grading::new(&[4.0, 2.51, 2.5, 2.0, 1.0], &[0.7, 1e-3, 0.5, 1.0]);
@@ -122,7 +123,7 @@ mod tests {
         for k in 0..=1000 {
             let t = 1.0 + 3.0 * f64::from(k) / 1000.0;
             let (there, back) = (graded().sum(t), backwards.sum(t));
-            // Rates reach a thousand, and are nowhere below one.
+            // The density reaches a thousand and is nowhere below one.
             let rounding = 8.0 * f64::EPSILON * total;
             assert!((there + back - total).abs() < 1e3 * 8.0 * f64::EPSILON * t + rounding);
             assert!((graded().time(there) - t).abs() < rounding, "{t}");
@@ -130,7 +131,7 @@ mod tests {
         }
     }
 
-    /// Every part of a mesh of factor c/2 is half a part of one of c, in s.
+    /// In s, every element of a mesh of factor c/2 is half an element of that of factor c.
     #[test]
     fn meshes_of_two_factors_are_one_refined() {
         let grading = graded();

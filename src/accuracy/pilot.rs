@@ -1,64 +1,65 @@
-//! A run with steps that follow the error of each, to learn where they have to be short.
+//! The pilot run: its steps are controlled by the local error, in order to find where steps must be short.
 
 use super::grading::Grading;
 use crate::motion::breaks_within;
 use std::ops::Range;
 
-/// Two elements of different order over the same step.
+/// Two elements of different order that solve the same steps.
 pub(crate) trait Pair {
-    /// Makes a step of both from where the motion is; false where one of them fails.
+    /// Solves a step with both elements from the current state; false if one of them fails.
     fn attempt(&mut self, t: f64, h: f64) -> bool;
     /// Whether shorter steps would fail as well.
     fn is_stopped(&self) -> bool {
         false
     }
-    /// How far both are apart after that step, of each kind.
+    /// The differences between the two elements after that step, one for each kind of quantity.
     fn apart(&self) -> &[f64];
-    /// The largest number of each kind, so far and after that step.
+    /// The largest magnitude of each kind so far, including that step.
     fn sizes(&self) -> &[f64];
-    /// The motion goes on from where that step has ended.
+    /// Accepts the step.
     fn keep(&mut self);
 }
 
-/// What a pilot run is asked.
+/// The specification of a pilot run.
 #[derive(Clone, Debug)]
 pub(crate) struct Course {
     pub(crate) span: Range<f64>,
-    /// Times at which elements have to end.
+    /// Times at which elements must end.
     pub(crate) breaks: Vec<f64>,
     /// The longest step allowed.
     pub(crate) longest: f64,
-    /// The first one that is tried.
+    /// The length of the first attempt.
     pub(crate) first: f64,
-    /// The power of the step with which errors of one step fall.
+    /// The order p + 1 of the local error.
     pub(crate) power: f64,
-    /// What a step may be off by, relative to the largest number of its kind.
+    /// The tolerance of the local error, relative to the largest magnitude of its kind.
     pub(crate) local: f64,
 }
 
-/// The controller aims at steps shorter by this factor than the estimate would allow.
+/// Safety factor: steps are shorter than the error estimate asks for.
 const SAFETY: f64 = 0.85;
-/// By which factors steps change.
+/// Limits of the ratio of successive steps.
 const LEAST_FACTOR: f64 = 0.15;
 const MOST_FACTOR: f64 = 5.0;
-/// After a step that fails.
+/// The reduction of a step that failed.
 const FAILED: f64 = 0.25;
-/// A pilot run with more steps costs more than it can save.
+/// The largest number of attempts; a longer pilot run costs more than it can save.
 const MOST_STEPS: usize = 200_000;
-/// Steps that are shorter than this part of the time are none.
+/// The shortest step, relative to the time.
 const SHORTEST: f64 = 1e-14;
-/// Where steps differ by less, equal ones are as good.
+/// The ratio of the longest to the shortest step below which equal steps are used.
 const VARIES: f64 = 3.0;
 
-/// A step that was kept.
+/// An accepted step.
 struct Kept {
     h: f64,
     apart: Vec<f64>,
 }
 
-/// The grading with which a step is off by [`Course::local`]; `None` where equal steps are as good, or where no steps were found.
+/// The grading whose steps have the local error [`Course::local`]; `None` if equal steps are as good, or if the pilot
+/// run failed.
 ///
-/// An error e of a step h asks for the step h (local/e)^{1/(p+1)} (T-103).
+/// A step h with the error e asks for the step h (local/e)^{1/(p+1)} (T-103).
 pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
     let Range { start, end } = course.span;
     let direction = (end - start).signum();
@@ -71,7 +72,7 @@ pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
         while t != corner {
             attempts += 1;
             let left = (corner - t).abs();
-            // No crumbs before a corner.
+            // No very short step before a break.
             let parts = (left / wanted).ceil().clamp(1.0, 2.0);
             let h = if parts == 1.0 {
                 left
@@ -107,7 +108,7 @@ pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
             nodes.push(t);
         }
     }
-    // Numbers of a kind may have been small at first.
+    // The scale of a kind may have been small at first.
     let sizes = pair.sizes();
     let steps = kept.iter().map(|one| {
         let step = one.h * course.factor(relative(&one.apart, sizes));
@@ -121,7 +122,8 @@ pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
     }
 }
 
-/// Whether the steps that errors ask for differ; of those that may be longer by more than steps change at once nothing is known.
+/// Whether the steps that the errors ask for vary. Steps that could grow by more than the largest ratio are ignored:
+/// their length is not known.
 fn varies(course: &Course, kept: &[Kept], steps: &[f64]) -> bool {
     let known = kept
         .iter()
@@ -133,7 +135,7 @@ fn varies(course: &Course, kept: &[Kept], steps: &[f64]) -> bool {
     most > VARIES * least
 }
 
-/// Breaks inside a span in the order of the run, and its end.
+/// The breaks inside a span, in the order of the run, and its end.
 pub(crate) fn corners(span: &Range<f64>, breaks: &[f64]) -> Vec<f64> {
     let mut corners = breaks_within(span, breaks);
     corners.push(span.end);
@@ -141,14 +143,14 @@ pub(crate) fn corners(span: &Range<f64>, breaks: &[f64]) -> Vec<f64> {
 }
 
 impl Course {
-    /// By what factor a step may be longer.
+    /// The ratio of the next step to one with a given error.
     fn factor(&self, off: f64) -> f64 {
         let factor = (self.local / off).powf(1.0 / self.power);
         factor.clamp(LEAST_FACTOR, MOST_FACTOR)
     }
 }
 
-/// The largest one over its size; zero of zero is none.
+/// The largest relative difference; a difference of zero counts as zero for any scale.
 fn relative(apart: &[f64], sizes: &[f64]) -> f64 {
     let mut most = 0.0;
     for (apart, size) in apart.iter().zip(sizes) {
@@ -167,7 +169,7 @@ fn relative(apart: &[f64], sizes: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Steps are off by C(t) h⁵ with C = 1/w(t)⁵, and fail at and above twice w.
+    /// A law of errors for tests: a step has the error C(t) h⁵ with C = 1/w(t)⁵, and fails if it is longer than 2 w.
     struct Law<F> {
         wanted: F,
         apart: Vec<f64>,
@@ -176,7 +178,7 @@ mod tests {
 
     impl<F: Fn(f64) -> f64> Pair for Law<F> {
         fn attempt(&mut self, t: f64, h: f64) -> bool {
-            // The worst of the step.
+            // The largest C within the step.
             let places = (0..=16).map(|k| t + h * f64::from(k) / 16.0);
             let wanted = places.map(&self.wanted).fold(f64::INFINITY, f64::min);
             self.apart = vec![LOCAL * (h.abs() / wanted).powi(5)];
@@ -215,7 +217,7 @@ mod tests {
         (explore(&course, &mut pair), pair.kept)
     }
 
-    /// Where steps of w(t) are right, ρ is about 1/w, over four orders of it.
+    /// Where the step should be w(t), ρ is about 1/w, over four orders of magnitude.
     #[test]
     fn gradings_follow_the_errors() {
         let wanted = |t: f64| 1e-4 + 0.5 * (t - 5.0).abs().min(1.0);
@@ -227,7 +229,7 @@ mod tests {
                 .map(|k| 5e-5 / wanted(first + (last - first) * (f64::from(k) + 0.5) / 2e5))
                 .sum();
             let sum = grading.sum(span.end);
-            // Steps are as short as the worst place in them asks for, and change by factors from one to the next.
+            // A step is determined by the most difficult time in it, and its ratio to the next one is limited.
             assert!(sum > 0.9 * exact && sum < 4.0 * exact, "{sum} {exact}");
             assert!((kept as f64) < 5.0 * exact, "{kept} {exact}");
             let nodes = grading.nodes(span.start, span.end, 1.0);

@@ -1,4 +1,5 @@
-//! The search for a step: a probe at the start, then runs over the whole span, each compared with the one before.
+//! The search for a step size: a probe at the start, then runs over the whole span, each compared with the previous
+//! one.
 
 mod cuts;
 mod ladder;
@@ -21,20 +22,22 @@ pub(crate) use runs::{
 };
 use tfe_runtime::{Element, Solve, Statistics};
 
-/// Above it a motion of these elements takes fewer operations with four points than with eight, below it the other way round; so it was on eight scenes
-/// from a pendulum to eighteen coordinates of planets (`docs/theory.md` §14.3).
+/// For accuracies above this, a motion takes fewer operations with four quadrature points than with eight, and vice
+/// versa. Measured on eight examples, from a pendulum to planets with eighteen coordinates (`docs/theory.md` §14.3).
 const FEW_POINTS: f64 = 1e-5;
-/// What iterations may leave of that in the run that a motion is verified by.
+/// The tolerance of iterations in the verifying run, relative to that of the run to be verified.
 const VERIFIED: f64 = 1e-3;
-/// Equal steps up to this number cost less than to look where they may be longer.
+/// Up to this number of equal steps, a pilot run would cost more than it saves.
 const MANY: f64 = 200.0;
-/// By what factor a step that contracts is shorter than one that is accurate where Newton's method pays.
+/// Newton's method is used if its steps can be longer than those for which the fixed-point iteration converges by this
+/// factor.
 const STIFF: f64 = 3.0;
 
-/// Runs until the estimated error is at or below what is asked: with equal steps, and where those would be many with steps that vary, if there is a pilot.
+/// Makes runs until the estimated error is within the accuracy: with equal steps, or, if those would be many and there
+/// is a pilot run, with graded steps.
 ///
 /// # Errors
-/// What stops runs of every step.
+/// A failure that does not depend on the step size.
 pub(crate) fn search(
     asked: &Asked,
     run: &mut dyn Runner,
@@ -85,7 +88,7 @@ pub(crate) fn search(
     Ok(found)
 }
 
-/// Runs with steps as short as they have to be.
+/// Makes runs with decreasing steps; fails if these become too many.
 fn run_down(
     asked: &Asked,
     way: (Way<'_>, f64),
@@ -100,14 +103,15 @@ fn run_down(
     }
 }
 
-/// The factor of a grading whose steps are off by `local`: so many of them add up to the accuracy (T-103). The first run takes none longer than the pilot run did: what
-/// that has not seen is not there.
+/// The factor of a grading whose steps have the local error `local`, such that the sum of the errors meets the accuracy
+/// (T-103). It is limited so that the first run takes no longer steps than the pilot run: it could step over what the
+/// pilot run has not seen.
 pub(crate) fn factor_for(accuracy: f64, element: Element, local: f64, steps: f64) -> f64 {
     let factor = (accuracy / (local * steps)).powf(1.0 / element.order() as f64) / LONGER;
     factor.min(1.0 / COARSER)
 }
 
-/// The cheapest element of those that are tried.
+/// The cheapest of the elements considered, for steps solved by fixed-point iteration.
 pub(crate) fn element_for(accuracy: f64) -> Element {
     if accuracy > FEW_POINTS {
         Element::mixed(5)
@@ -116,7 +120,8 @@ pub(crate) fn element_for(accuracy: f64) -> Element {
     }
 }
 
-/// The same where Newton's method makes the steps and what is fast has to be damped: its cost rises with the third power of the number of points.
+/// The cheapest element with numerical damping, for steps solved by Newton's method, whose cost grows with the third
+/// power of the number of points.
 pub(crate) fn damping_element_for(accuracy: f64) -> Element {
     if accuracy > FEW_POINTS {
         Element::radau(5)
@@ -125,7 +130,7 @@ pub(crate) fn damping_element_for(accuracy: f64) -> Element {
     }
 }
 
-/// The way with equal steps that Newton's method makes, as long as may be.
+/// A trial with equal steps, solved by Newton's method, with the longest step allowed.
 fn newton_way<'a>(asked: &Asked) -> Way<'a> {
     let length = (asked.span.end - asked.span.start).abs();
     Way {
@@ -139,7 +144,7 @@ fn newton_way<'a>(asked: &Asked) -> Way<'a> {
     }
 }
 
-/// The way with a grading, and its factor.
+/// A trial with a grading, and its factor.
 fn graded_way<'a>(asked: &'a Asked, graded: &'a Graded) -> (Way<'a>, f64) {
     let mut way = Way {
         element: graded.element,
@@ -155,7 +160,7 @@ fn graded_way<'a>(asked: &'a Asked, graded: &'a Graded) -> (Way<'a>, f64) {
     (way, graded.factor.min(longest))
 }
 
-/// The way with equal steps, and a step by a probe at the start.
+/// A trial with equal steps, and the step size that a probe at the start suggests.
 fn even_way<'a>(asked: &'a Asked, run: &mut dyn Runner) -> Result<(Way<'a>, f64), RunErrorKind> {
     let element = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
     let length = (asked.span.end - asked.span.start).abs();
@@ -172,7 +177,7 @@ fn even_way<'a>(asked: &'a Asked, run: &mut dyn Runner) -> Result<(Way<'a>, f64)
     way.step = longest.min(length / FIRST);
     let mut step = probe(asked, &mut way, longest, run);
     if asked.may_iterate && step.as_ref().map_or(true, |(_, factor)| *factor > STIFF) {
-        // Steps that contract are far shorter than they need be: it is not accuracy that limits them.
+        // The convergence of the fixed-point iteration, not the accuracy, limits the step.
         let mut implicit = Way {
             by_iteration: false,
             step: longest,
@@ -189,7 +194,7 @@ fn even_way<'a>(asked: &'a Asked, run: &mut dyn Runner) -> Result<(Way<'a>, f64)
         }
     }
     let (step, _) = step?;
-    // Longer steps than that need not contract.
+    // With much longer steps the fixed-point iteration may not converge.
     way.step = if way.by_iteration {
         (way.step * LONGER).max(step)
     } else {
@@ -198,7 +203,7 @@ fn even_way<'a>(asked: &'a Asked, run: &mut dyn Runner) -> Result<(Way<'a>, f64)
     Ok((way, step))
 }
 
-/// Runs with shorter and shorter steps, the first one about `step`.
+/// Makes runs with decreasing steps, the first one of about `step`.
 fn climb(
     asked: &Asked,
     (way, step): (Way<'_>, f64),
@@ -222,7 +227,8 @@ fn climb(
         let taken = way.taken();
         let mut here = way.clone();
         if !way.keeps {
-            // Its error is so much larger than that of the run that it is compared with; and errors of iterations that grow with the motion show in the comparison.
+            // The error of the first run is much larger than that of the second; and amplified iteration errors become
+            // visible in the comparison.
             here.tolerance *= (COARSER.powf(element.order() as f64) / 3.0).max(1.0);
         }
         match run.run(&here) {
@@ -276,7 +282,7 @@ fn climb(
             accuracy: asked.accuracy,
             error_estimate: largest(&errors),
             attempts,
-            // Whoever makes the runs counts.
+            // The work is counted by the runner.
             work: Statistics::NONE,
         },
         times: cuts[1..].to_vec(),
@@ -284,8 +290,10 @@ fn climb(
     })))
 }
 
-/// Compares the last run with one of the next higher order over the same steps, whose iterations end much later: that tells its error, whatever runs with other steps have told.
-/// Gives a shorter step where it is too large. Where steps do not contract an order may be reduced, of both elements alike: the estimate becomes no smaller then.
+/// Verifies the last run by one of the next higher order over the same steps, with a much smaller tolerance. The
+/// difference estimates its error independently of the runs with other steps. Returns a shorter step if the error is
+/// too large. Without a converging fixed-point iteration (stiff motion), the orders of both elements may be reduced
+/// alike; the estimate is then never decreased.
 fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut dyn Runner) -> Option<f64> {
     let (_, last) = ladder.last.as_ref()?;
     let (errors, is_met) = ladder.errors.as_mut()?;
@@ -299,10 +307,10 @@ fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut dyn Runner) 
         keeps: false,
         ..way.clone()
     };
-    // Where that fails the estimate stays as it was.
+    // If this run fails, the estimate stays.
     let ran = run.run(&better).ok()?;
     let seen = difference(&last.trace, &ran.trace);
-    // What iterations leave shows in the comparison.
+    // The comparison contains the iteration error, so the allowance for it is removed.
     let left = LEFT * ladder.accuracy;
     for (error, seen) in errors.iter_mut().flatten().zip(seen.iter().flatten()) {
         let told = if last.contracts { 0.0 } else { *error - left };
@@ -327,7 +335,7 @@ mod tests {
     use crate::accuracy::trace::Trace;
     use tfe_runtime::StepError;
 
-    /// Runs whose errors are known.
+    /// Runs with errors by a known law.
     struct Law<F> {
         error: F,
         contracts: bool,
@@ -390,7 +398,8 @@ mod tests {
         }
     }
 
-    /// Runs that are off by what `error` says of element, step and tolerance, over ten units of time.
+    /// The result of a search over ten units of time, with runs whose errors `error` gives for an element, a step and a
+    /// tolerance.
     fn found(
         accuracy: f64,
         contracts: bool,
@@ -425,7 +434,7 @@ mod tests {
         Ok((found, law.last))
     }
 
-    /// Errors h^p: the estimate is right, and the step no shorter than safety asks for.
+    /// Errors h^p: the estimate is right, and the step is not shorter than the safety factors require.
     #[test]
     fn finds_the_step_of_a_power_law() {
         for accuracy in [1e-2, 1e-4, 1e-6, 1e-9, 1e-12] {
@@ -433,7 +442,7 @@ mod tests {
             let (found, error) = found(accuracy, true, law).expect("runs");
             assert!(found.is_met && error <= accuracy, "{accuracy}: {error}");
             let estimate = found.picked.error_estimate;
-            // The element beside it is off by h² times as much.
+            // The error of the element of the next order is smaller by h².
             assert!(
                 (estimate - error).abs() < 0.5 * error + 1e-15,
                 "{estimate}, {error}"
@@ -446,7 +455,7 @@ mod tests {
         }
     }
 
-    /// The same in pairs, from steps that are far too long and from such as are too short.
+    /// The same for runs in pairs, from first steps that are far too long or too short.
     #[test]
     fn pairs_find_the_step_of_a_power_law() {
         for accuracy in [1e-2, 1e-4, 1e-6, 1e-9, 1e-12] {
@@ -477,7 +486,8 @@ mod tests {
         }
     }
 
-    /// What does not fall with the step is refused, after a run over the whole span; what falls with the tolerance is met.
+    /// An error that does not decrease with the step is refused, after a run over the whole span; one that decreases
+    /// with the tolerance is met.
     #[test]
     fn pairs_know_what_cannot_be_had() {
         let noise = |way: &Way<'_>, step: f64| (1e5 * step + way.element.nodes() as f64).sin();
@@ -492,7 +502,8 @@ mod tests {
         assert!(outcome.is_err());
     }
 
-    /// Errors that fall with h² alone, whatever the element promises, where Newton's method makes the steps: the power is measured, and the error met.
+    /// Errors decrease as h² only, whatever the order of the element, with Newton's method: the order is measured, and
+    /// the accuracy met.
     #[test]
     fn measures_an_order_that_is_reduced() {
         let (found, error) = found(1e-6, false, |_, step| 1e-3 * step * step).expect("runs");
@@ -500,7 +511,7 @@ mod tests {
         assert!(found.picked.attempts.len() > 2);
     }
 
-    /// What roundings leave does not fall, and what iterations leave falls with the tolerance alone.
+    /// Rounding errors do not decrease, and iteration errors decrease only with the tolerance.
     #[test]
     fn knows_what_cannot_be_had_and_tightens_what_can() {
         let noise = |step: f64| (1e5 * step).sin();
@@ -511,7 +522,7 @@ mod tests {
         assert!(found.is_met && error.abs() <= 1e-6, "{error}");
     }
 
-    /// Runs that fail whatever the step, and are refused where the time does not resolve it.
+    /// Runs that fail with every step, and with another error where the time does not resolve the step.
     struct Failing;
 
     impl Runner for Failing {
@@ -540,7 +551,7 @@ mod tests {
         }
     }
 
-    /// The reason is that of the steps which the time resolves.
+    /// The error returned is that of the steps which the time resolves.
     #[test]
     fn what_fails_with_every_step_says_why() {
         let asked = Asked {

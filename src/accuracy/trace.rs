@@ -1,21 +1,21 @@
-//! What two runs are compared by: states and outputs at times that both pass.
+//! The data by which two runs are compared: states and outputs at common times.
 
 use std::ops::Range;
 
-/// Rows of numbers, one a time: coordinates, momenta, outputs.
+/// One row of numbers for each time: coordinates, momenta, outputs.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Trace {
-    /// Numbers of one kind lie together: all coordinates, all momenta, one output.
+    /// The column ranges of each kind: all coordinates, all momenta, each single output.
     kinds: Vec<Range<usize>>,
     rows: Vec<f64>,
-    /// How many events had changed the motion, at each row.
+    /// The number of events that had changed the motion, for each row.
     acts: Vec<usize>,
-    /// The largest finite number of each kind so far, also between the rows.
+    /// The largest finite magnitude of each kind so far, also between the rows.
     sizes: Vec<f64>,
 }
 
 impl Trace {
-    /// Without rows, for so many coordinates and outputs.
+    /// An empty trace for a number of coordinates and of outputs.
     pub(crate) fn new(coordinates: usize, outputs: usize) -> Self {
         let n = coordinates;
         let outputs = (2 * n..2 * n + outputs).map(|k| k..k + 1);
@@ -28,7 +28,7 @@ impl Trace {
         }
     }
 
-    /// Looks at all numbers of one time, and keeps them as a row if they are to be compared.
+    /// Takes the numbers at one time; they become a row if `keeps`.
     pub(crate) fn pass(&mut self, row: &[f64], acts: usize, keeps: bool) {
         for (size, kind) in self.sizes.iter_mut().zip(&self.kinds) {
             *size = largest(*size, &row[kind.clone()]);
@@ -39,22 +39,22 @@ impl Trace {
         }
     }
 
-    /// How many numbers a row has.
+    /// The length of a row.
     pub(crate) fn width(&self) -> usize {
         self.kinds.last().map_or(0, |kind| kind.end)
     }
 
-    /// The largest difference of two rows, of each kind.
+    /// The largest difference of each kind between two rows.
     pub(crate) fn apart(&self, a: &[f64], b: &[f64], apart: &mut Vec<f64>) {
         apart.clear();
         apart.extend(self.kinds.iter().map(|kind| {
             let pairs = a[kind.clone()].iter().zip(&b[kind.clone()]);
-            // Infinite where something is not finite, which `f64::max` would drop.
+            // Infinite if something is not finite, since `f64::max` would ignore NaN.
             pairs.fold(0.0, |most: f64, (a, b)| most.max(finite((a - b).abs())))
         }));
     }
 
-    /// The largest number of each kind, those of a row included.
+    /// The largest magnitude of each kind, including those of a row.
     pub(crate) fn sizes_with(&self, row: &[f64], sizes: &mut Vec<f64>) {
         sizes.clear();
         let kinds = self.kinds.iter().zip(&self.sizes);
@@ -66,9 +66,10 @@ impl Trace {
     }
 }
 
-/// The largest relative difference at each time, of each kind: over the largest number of that kind that either run has passed. Infinite where
-/// something is not finite, and where one run is an event ahead of the other for more than one time: at a single one the event's time is as uncertain as the states are, which those after it tell,
-/// and the difference there is left out.
+/// The largest relative difference at each time, for each kind, relative to the largest magnitude of that kind in both
+/// runs. Infinite if something is not finite, or if one run is an event ahead of the other for more than one time. At a
+/// single such time the difference is left out: the time of the event is as uncertain as the states, which later rows
+/// compare.
 pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
     let is_same = |row: usize| a.acts.get(row) == b.acts.get(row);
     let side = |row: usize| {
@@ -86,7 +87,7 @@ pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
         let relative = |(a, b): (&[f64], &[f64])| {
             let pairs = a[kind.clone()].iter().zip(&b[kind.clone()]);
             let largest = pairs.fold(0.0, |most: f64, (a, b)| most.max(finite((a - b).abs())));
-            // Zero of zero is no error.
+            // The relative difference of zero and zero is zero.
             if largest == 0.0 {
                 0.0
             } else {
@@ -103,16 +104,17 @@ pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
     differences
 }
 
-/// Where two runs are beside each other's events.
+/// Whether two runs have passed the same events.
 enum Side {
     Same,
-    /// One has met an event that the other is about to meet.
+    /// One run has passed an event that the other will pass before the next row.
     Between,
-    /// One has met an event that the other does not meet.
+    /// One run has passed an event that the other does not pass.
     Apart,
 }
 
-/// The largest magnitude beside what there is already. Beside an infinite one, as of 1/x at zero, all errors would be none.
+/// The largest magnitude including earlier ones. Infinite values, such as 1/x at zero, are skipped: relative to them
+/// all errors would vanish.
 fn largest(so_far: f64, numbers: &[f64]) -> f64 {
     let finite = numbers.iter().filter(|x| x.is_finite());
     finite.fold(so_far, |largest, x| largest.max(x.abs()))
@@ -169,7 +171,8 @@ mod tests {
         assert_eq!(difference(&a, &b)[0], [f64::INFINITY]);
     }
 
-    /// One run meets an event a time earlier than the other: left out, unless it is an event that the other does not meet at all.
+    /// One run meets an event one row earlier than the other: this row is left out, unless the other run never meets
+    /// the event.
     #[test]
     fn runs_are_compared_between_the_same_events() {
         let of = |acts: [usize; 4], x: [f64; 4]| {

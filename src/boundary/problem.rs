@@ -1,4 +1,4 @@
-//! The problem, its equations and its solution.
+//! Boundary-value problems: the problem, its equations and its solution.
 
 use crate::assembly::{
     Assembly, AssemblyError, ClosureMut, Control, Curve, Iterate, Mesh, MeshError, Problem,
@@ -23,7 +23,7 @@ pub enum Component {
 }
 
 impl Component {
-    /// Its place in the order (p, q).
+    /// The index in the order (p, q).
     pub(crate) fn place<const N: usize>(self) -> Option<usize> {
         match self {
             Self::Momentum(index) if index < N => Some(index),
@@ -40,7 +40,7 @@ impl Component {
     }
 }
 
-/// A given value of a component at one end.
+/// A prescribed component at one end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Condition {
     pub(crate) at_end: bool,
@@ -48,7 +48,7 @@ pub(crate) struct Condition {
     pub(crate) value: f64,
 }
 
-/// Whether a span has a length.
+/// Checks that a span has a nonzero finite length.
 pub(crate) fn check_span(span: &Range<f64>) -> Result<(), BoundaryError> {
     let Range { start, end } = *span;
     if start.is_finite() && end.is_finite() && start != end {
@@ -57,7 +57,7 @@ pub(crate) fn check_span(span: &Range<f64>) -> Result<(), BoundaryError> {
     Err(BoundaryError::Span { start, end })
 }
 
-/// Whether each condition is one by itself.
+/// Checks that the conditions are valid and different.
 pub(crate) fn check_conditions<const N: usize>(
     conditions: &[Condition],
 ) -> Result<(), BoundaryError> {
@@ -81,7 +81,7 @@ pub(crate) fn check_conditions<const N: usize>(
     Ok(())
 }
 
-/// The straight line between the coordinates that are given; where only one end is, a constant.
+/// Linear interpolation of the prescribed coordinates; constant if only one end is prescribed.
 pub(crate) fn straight<const N: usize>(
     conditions: &[Condition],
     span: &Range<f64>,
@@ -311,7 +311,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
             statistics: assembly.statistics(),
             iterate,
         };
-        // Where all is given at one end no span is singular.
+        // With all conditions at one end, the problem is regular for every span.
         let at_end = self.conditions.iter().filter(|one| one.at_end).count();
         if (1..2 * N).contains(&at_end) && assembly.is_doubtful() {
             let motion = solution.motion();
@@ -341,7 +341,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         check_conditions::<N>(&self.conditions)
     }
 
-    /// Where all is given at the start, and no guess: the motion that steps of second order give, as long as the elements.
+    /// The first guess for a problem with all conditions at the start: a run of second-order steps on the same mesh.
     fn stepped(&self) -> Option<Motion<N>> {
         let mut start = State {
             q: [0.0; N],
@@ -367,7 +367,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     }
 }
 
-/// The chain of elements over a span, closed by conditions at its ends.
+/// The chain of elements over a span, with its conditions at the ends.
 pub(super) struct Spanned<'a, M, const N: usize> {
     model: &'a M,
     mesh: Mesh,

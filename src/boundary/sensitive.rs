@@ -1,4 +1,4 @@
-//! Solutions of boundary-value problems with their derivatives.
+//! Solutions of boundary-value problems with their derivatives by parameters and prescribed values.
 
 use super::problem::{BoundaryError, BoundaryMotion, BoundaryValue, Component, Condition};
 use crate::assembly::{By, derivatives};

@@ -1,4 +1,5 @@
-//! Where runs are compared, and how long steps are between.
+//! The times at which runs are compared, and the measure of steps between them. Steps are measured in time, or, with a
+//! grading, in s(t).
 
 use super::super::estimated::Attempt;
 use super::super::grading::Grading;
@@ -8,7 +9,7 @@ use crate::numbers::larger;
 use std::ops::Range;
 
 impl Way<'_> {
-    /// The length of the span and the longest step, both as steps are measured.
+    /// The length of the span and the longest step, in the measure of steps.
     pub(super) fn lengths(&self, asked: &Asked) -> (f64, f64) {
         let length = self.between(asked.span.start, asked.span.end);
         let longest = match self.grading {
@@ -18,7 +19,7 @@ impl Way<'_> {
         (length, longest)
     }
 
-    /// How long it is from a time to a later one, as steps are measured.
+    /// The distance between two times, in the measure of steps.
     pub(super) fn between(&self, from: f64, to: f64) -> f64 {
         match self.grading {
             Some(grading) => grading.sum(to) - grading.sum(from),
@@ -26,7 +27,8 @@ impl Way<'_> {
         }
     }
 
-    /// The longest step where all parts are cut into equal steps of at most `step`, as steps are measured.
+    /// The longest step if each part between comparisons is divided into equal steps of at most `step`, in the measure
+    /// of steps.
     pub(super) fn taken(&self) -> f64 {
         let parts = self.cuts.windows(2);
         parts
@@ -37,7 +39,7 @@ impl Way<'_> {
             .fold(0.0, larger)
     }
 
-    /// All nodes with a grading.
+    /// All nodes of a graded mesh.
     pub(crate) fn nodes(&self, grading: &Grading) -> Vec<f64> {
         let mut nodes: Vec<f64> = self.cuts.first().copied().into_iter().collect();
         for pair in self.cuts.windows(2) {
@@ -46,7 +48,8 @@ impl Way<'_> {
         nodes
     }
 
-    /// Gives attempts their longest steps in the units of time, where they have those that they [took](Self::taken); the shortest and the longest step of the last one.
+    /// Converts the longest steps of attempts, as [taken](Self::taken), to the units of time; returns the shortest and the
+    /// longest step of the last one.
     pub(super) fn measure(&mut self, attempts: &mut [Attempt]) -> (f64, f64) {
         let mut extremes = (self.step, self.step);
         for attempt in attempts {
@@ -57,7 +60,7 @@ impl Way<'_> {
         extremes
     }
 
-    /// The shortest and the longest step in the units of time.
+    /// The shortest and the longest step, in time.
     fn extremes(&self) -> (f64, f64) {
         let wider = |(least, most): (f64, f64), length: f64| (least.min(length), most.max(length));
         let none = (f64::INFINITY, 0.0);
@@ -76,12 +79,13 @@ impl Way<'_> {
     }
 }
 
-/// The longest step to ask for where so long ones are to be [taken](Way::taken) again: with one that is shorter by a rounding parts would have one more.
+/// The step size to ask for such that steps of the length [taken](Way::taken) are taken again: if it were shorter by a
+/// rounding error, parts would have one step more.
 pub(super) fn again(taken: f64) -> f64 {
     taken * (1.0 + 4.0 * f64::EPSILON)
 }
 
-/// Start, times of comparison with breaks among them, end.
+/// The start, the times of comparison including the breaks, and the end.
 pub(super) fn cuts(asked: &Asked, grading: Option<&Grading>, step: f64) -> Vec<f64> {
     match grading {
         Some(grading) => graded_cuts(asked, grading, step),
@@ -89,7 +93,7 @@ pub(super) fn cuts(asked: &Asked, grading: Option<&Grading>, step: f64) -> Vec<f
     }
 }
 
-/// The same far apart both in time and in steps: what is fast is seen by what it leaves.
+/// The same with a grading: well separated both in time and in steps. Fast phases in between affect the later states.
 fn graded_cuts(asked: &Asked, grading: &Grading, step: f64) -> Vec<f64> {
     let Range { start, end } = asked.span;
     let apart = (end - start).abs() / MOST_TIMES;

@@ -1,4 +1,4 @@
-//! Runs with shorter and shorter steps, each compared with the one before.
+//! Runs with decreasing steps, each compared with the previous one.
 
 use super::super::estimated::Attempt;
 use super::super::trace::difference;
@@ -8,28 +8,29 @@ use super::runs::{
 };
 use tfe_runtime::Element;
 
-/// Runs with shorter and shorter steps.
+/// The results of runs with decreasing steps.
 pub(super) struct Ladder {
     pub(super) order: f64,
-    /// The same where steps vary and are long beside what is fast: there it is the error of the inside of an element that falls, with one power more.
+    /// The order for graded meshes whose steps are long relative to fast time scales: one more than that of the solution
+    /// inside an element.
     pub(super) reduced: f64,
     pub(super) accuracy: f64,
     pub(super) attempts: Vec<Attempt>,
-    /// The step and what came of it.
+    /// The last step and its run.
     pub(super) last: Option<(f64, Ran)>,
-    /// How far the last two runs were apart.
+    /// The difference between the last two runs.
     pub(super) apart: Option<f64>,
-    /// Of the last run, and whether that is enough.
+    /// The error estimate of the last run, and whether it meets the accuracy.
     pub(super) errors: Option<(Vec<Vec<f64>>, bool)>,
-    /// Comparisons in a row that have told nothing.
+    /// The number of successive comparisons without a meaningful result.
     pub(super) unresolved: u32,
 }
 
 pub(super) enum Verdict {
     Enough,
-    /// The next step.
+    /// The next step to try.
     Shorter(f64),
-    /// Shorter steps do not help: errors of iterations or of roundings have grown.
+    /// Shorter steps do not help: the iteration or rounding errors dominate.
     Floor,
 }
 
@@ -61,14 +62,14 @@ impl Ladder {
         (self.last, self.apart) = (None, None);
     }
 
-    /// Compares a run with the one before.
+    /// Compares a run with the previous one.
     pub(super) fn climb(&mut self, step: f64, ran: Ran) -> Verdict {
         let mut attempt = Attempt {
             step,
             error_estimate: None,
         };
         let Some((longer, before)) = self.last.replace((step, ran)) else {
-            // Where longer steps fail it is not accuracy that limits them.
+            // If longer steps have failed, the accuracy was not what limits the step.
             let has_failed = !self.attempts.is_empty() && self.order > HIGH;
             self.attempts.push(attempt);
             return Verdict::Shorter(step / if has_failed { LONGER } else { COARSER });
@@ -79,7 +80,8 @@ impl Ladder {
         let mut errors = difference(&before.trace, &ran.trace);
         let apart = largest(&errors);
         let contracts = before.contracts && ran.contracts;
-        // What the run before was off by is known now, and with what the one before that was off by, the power of the step.
+        // The difference is the error of the previous run; together with that of the run before, it gives the order of
+        // convergence.
         let ratio = longer / step;
         let power = match (self.apart, self.attempts.iter().rev().nth(1)) {
             (Some(earlier), Some(first)) if earlier <= RESOLVED => {
@@ -101,7 +103,8 @@ impl Ladder {
         } else {
             (LONGER, MOST_GAIN)
         };
-        // A power that is not measured is that of the element only where errors are known to fall with it.
+        // If the order was not measured, that of the element is used, which is only reliable where the fixed-point
+        // iteration converges.
         let power = power.map(|power| power.clamp(1.0, order));
         let known = (power.is_some() || contracts) && ratio > SAME;
         let power = power.unwrap_or(order);

@@ -1,8 +1,10 @@
-//! Runs beside one of the next order over the same steps, given up as soon as they are too far apart.
+//! Runs in pairs: two elements of successive orders over the same steps, abandoned as soon as their difference is too
+//! large.
 //!
-//! Where every step is made by Newton's method a run is dear, and a step from the start of the motion says little about the rest of it. So no step is probed and no run is compared
-//! with one of longer steps: two elements go side by side from the first step on, their distance is the error of the lower one (T-98), and steps that are too long, or much too
-//! short, are noticed on the way.
+//! If Newton's method solves every step, runs are expensive, and a step at the start of the motion says little about
+//! the rest. There is no probe then, and no comparison of runs with different steps: two elements run side by side from
+//! the first step on. Their difference is the error of the lower one (T-98), and steps that are too long, or much too
+//! short, are detected during the run.
 
 use super::super::estimated::{Attempt, Picked};
 use super::super::pilot::corners;
@@ -16,43 +18,46 @@ use crate::numbers::larger;
 use std::ops::ControlFlow;
 use tfe_runtime::{Element, Statistics};
 
-/// Errors stay below what is asked by this factor: the better run has an error, too.
+/// Safety factor of the error, since the more accurate run has an error, too.
 const SAFE: f64 = 1.1;
-/// Two elements that are farther apart may both be wrong: more is not aimed at.
+/// The largest accuracy aimed at: with a larger difference both elements may be wrong.
 const LOOSEST: f64 = 0.01;
-/// What iterations of the better run may leave of what those of the other may: a comparison is not spoilt by it.
+/// The tolerance of the more accurate run, relative to that of the other one, so that the comparison is not affected.
 const LEFT_BESIDE: f64 = 0.01;
-/// Steps that have come that far, in parts of the span, are not given up for longer ones.
+/// The fraction of the span after which a run is no longer abandoned for longer steps.
 const EARLY: f64 = 0.35;
-/// Steps are not given up for longer ones before that.
+/// The fraction of the span before which a run is not yet abandoned for longer steps.
 const NOT_EARLIER: f64 = 0.1;
-/// How much less a run with longer steps has to cost, what has been done included.
+/// The largest cost of a run with longer steps, relative to that of completing this one, for which it is abandoned.
 const WORTH: f64 = 0.8;
-/// By how much longer steps become at once.
+/// The largest increase of the step at once.
 const MOST_LONGER: f64 = 3.0;
-/// By how much shorter.
+/// The largest reduction of the step at once.
 const MOST_SHORTER: f64 = 0.3;
-/// After a step that fails, or of which both elements know nothing.
+/// The reduction of a step that failed, or whose difference is meaningless.
 const FAILED: f64 = 0.5;
-/// By how much shorter at least.
+/// The smallest reduction of the step.
 const BELOW: f64 = 0.87;
-/// Errors that will be larger by this factor, if they go on growing with the time, are not waited for.
+/// A run is abandoned if its error, extrapolated to the end of the span, exceeds the accuracy by this factor.
 const FORESEEN: f64 = 4.0;
-/// From when on that is known: if they grow with the time, and if they grow as they have done.
+/// The fractions of the span from which on linear growth of the error, and growth with its measured power, are
+/// extrapolated.
 const FORESEEN_FROM: [f64; 2] = [0.1, 0.4];
-/// The power of the time with which errors are expected to grow where that was not measured.
+/// The power of time with which errors are assumed to grow if it was not measured.
 const GROWTH: f64 = 1.5;
-/// No more is believed of what was measured from the start on, and after a good part of the span.
+/// The largest measured power that is trusted: for the next step size, and after a good part of the span.
 const MOST_GROWTH: [f64; 2] = [2.0, 4.0];
-/// Steps that are to be much shorter become a little shorter still, by this power of the factor: errors fall with less than their order where steps are long.
+/// Large reductions of the step are raised by this additional power: with long steps errors decrease more slowly than
+/// their order says.
 const EXTRAPOLATED: f64 = 0.1;
-/// Runs, those included that were given up at their start: a step that is halved as often is nothing.
+/// The largest number of attempts, including those abandoned early; so many halvings leave no step.
 const MOST_STARTS: usize = 40;
-/// Shorter steps that have not brought the runs closer.
+/// The number of times that shorter steps have not reduced the difference, after which the search ends.
 const MOST_FLOORS: u32 = 3;
 
-/// The element for an accuracy where Newton's method makes every step: a step costs more than in proportion to its points, so fewer of them pay than where a fixed point is iterated.
-/// On the mechanisms of `tests/constraints/small_steps.rs` these, or those of a node less, take the least time in most cases.
+/// The element for steps solved by Newton's method. The cost of a step grows faster than its number of points, so that
+/// fewer points are best than with fixed-point iteration. On the mechanisms of `tests/constraints/small_steps.rs`
+/// these, or those with one node less, are fastest in most cases.
 pub(super) fn element_for(accuracy: f64) -> Element {
     let nodes = match accuracy {
         a if a > 3e-5 => 4,
@@ -63,32 +68,32 @@ pub(super) fn element_for(accuracy: f64) -> Element {
     Element::mixed(nodes)
 }
 
-/// What a run was given up for.
+/// The reason why a run was abandoned, with the factor of the next step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Verdict {
     Shorter(f64),
     Longer(f64),
 }
 
-/// Looks at two runs on their way.
+/// Judges two runs while they are made.
 struct Judge {
     accuracy: f64,
     order: f64,
-    /// By how much longer steps may become.
+    /// The largest increase of the step.
     most_longer: f64,
-    /// Whether the run is made to its end, whatever it is off by.
+    /// Whether the run is completed in any case.
     is_last: bool,
-    /// The largest number of each kind in all runs.
+    /// The largest magnitude of each kind over all runs.
     sizes: Vec<f64>,
     error: f64,
-    /// The part of the span that is done.
+    /// The completed fraction of the span.
     done: f64,
-    /// Both, at every node so far.
+    /// The completed fraction and the error, at every node so far.
     passed: Vec<(f64, f64)>,
 }
 
 impl Judge {
-    /// Gives up what is too far off, or too exact.
+    /// Returns a verdict if the error is or will be too large, or unnecessarily small.
     fn look(&mut self, done: f64, beside: &Beside<'_>) -> Option<Verdict> {
         self.sizes.resize(beside.sizes.len(), 0.0);
         let mut error = self.error;
@@ -114,7 +119,7 @@ impl Judge {
         if !(error <= self.accuracy && foreseen <= FORESEEN * self.accuracy) {
             return Some(Verdict::Shorter(self.shorter()));
         }
-        // At the start a motion may be slow.
+        // Quadratic growth is assumed, since the motion may be slow at the start.
         let end = larger(error, f64::EPSILON) / (done * done);
         let longer = (self.accuracy / end).powf(1.0 / self.order) / AIM;
         let longer = longer.min(self.most_longer);
@@ -122,7 +127,7 @@ impl Judge {
         (is_early && 1.0 / longer < WORTH * (1.0 - done)).then_some(Verdict::Longer(longer))
     }
 
-    /// The factor of steps that are off by no more than is asked.
+    /// The factor by which steps must be shorter.
     fn shorter(&self) -> f64 {
         if !(self.error <= RESOLVED) {
             return FAILED;
@@ -131,7 +136,8 @@ impl Judge {
         (factor.powf(1.0 + EXTRAPOLATED) / AIM).clamp(MOST_SHORTER, BELOW)
     }
 
-    /// The error at the end of the span, if errors go on growing with the power of the time with which they have, between 1 and `most`.
+    /// Extrapolates the error to the end of the span, with the power of time by which it has grown; the power is
+    /// limited to between 1 and `most`.
     fn foreseen(&self, most: f64) -> f64 {
         let Self { error, done, .. } = *self;
         let half = self.passed.partition_point(|(then, _)| *then < 0.5 * done);
@@ -139,7 +145,7 @@ impl Judge {
             return error * done.powf(-GROWTH);
         };
         let power = (error / before).ln() / (done / then).ln();
-        // Of zero, or no number.
+        // If the error was zero or NaN.
         let power = if power.is_finite() {
             power.clamp(1.0, most)
         } else {
@@ -149,10 +155,10 @@ impl Judge {
     }
 }
 
-/// Runs in pairs until one is off by no more than is asked.
+/// Makes runs in pairs until one meets the accuracy.
 ///
 /// # Errors
-/// What stops runs of every step.
+/// A failure that does not depend on the step size.
 pub(super) fn climb(
     asked: &Asked,
     way: Way<'_>,
@@ -184,7 +190,7 @@ pub(super) fn climb(
         passed: Vec::new(),
     };
     let (mut failure, mut errors) = (None, None);
-    // The error that the whole of a run with longer steps would have had.
+    // The extrapolated error of the previous run, which had longer steps.
     let mut before: Option<f64> = None;
     let (mut floors, mut tightened) = (0, 1.0);
     let mut runs = 0;
@@ -193,10 +199,10 @@ pub(super) fn climb(
             let step = way.step;
             return Ok(Some(Climbed::TooMany { attempts, step }));
         }
-        // What was given up early was no run.
+        // A run that was abandoned early does not count.
         runs += usize::from(judge.done >= NOT_EARLIER);
         judge.is_last = runs + 1 >= MOST_RUNS || floors == MOST_FLOORS;
-        // Half of the way to steps that were too long, if there were any.
+        // At most the geometric mean with the shortest step that was too long.
         judge.most_longer = (MOST_LONGER.min(longest / way.step)).min((too_long / way.step).sqrt());
         (judge.error, judge.done) = (0.0, 0.0);
         judge.passed.clear();

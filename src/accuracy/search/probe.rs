@@ -1,32 +1,32 @@
-//! One step at the start against two of half its length: a step that is near.
+//! A first estimate of the step size, from one step at the start compared with two of half its length.
 
 use super::super::trace::difference;
 use super::runs::{Asked, HIGH, LONGER, MANY_TO_PROBE, Runner, Way, largest};
 use crate::error::RunErrorKind;
 
-/// A step that is near, and by what factor it should be longer than the longest one that could be made, which stays in `way`: one step at the start against two of half its length.
+/// Returns an estimated step size, and its ratio to the longest step that could be solved, which is left in `way`.
 pub(super) fn probe(
     asked: &Asked,
     way: &mut Way<'_>,
     longest: f64,
     run: &mut dyn Runner,
 ) -> Result<(f64, f64), RunErrorKind> {
-    /// Halvings of the span: 2⁻⁶⁰ of it is nothing.
+    /// The largest number of halvings of the span.
     const MOST: u32 = 60;
-    /// A difference that tells the order.
+    /// The largest difference that shows the order of the element.
     const CLEAR: f64 = 1e-3;
-    /// Errors are not known to go on falling over a larger factor.
+    /// The smallest factor by which the step may be reduced without another probe.
     const FAR: f64 = 0.6;
-    /// Shorter steps that are tried only to know better.
+    /// The largest number of shorter probes made only to improve the estimate.
     const MOST_HALVED: u32 = 1;
-    /// A step that is to be longer by more is tried.
+    /// A longer step is tried if the estimate exceeds the present one by this factor.
     const SHORT: f64 = 1.8;
     let Asked { accuracy, span, .. } = asked;
     let length = (span.end - span.start).abs();
     let direction = (span.end - span.start).signum();
     let order = way.element.order() as f64;
     let mut failure = None;
-    // What is known, and that longer steps are no good.
+    // The best estimate so far, and whether longer steps have failed.
     let mut known: Option<(f64, f64)> = None;
     let mut is_longest = false;
     let mut halved = 0;
@@ -46,7 +46,7 @@ pub(super) fn probe(
         });
         let shorter = match apart {
             Ok(apart) if apart <= CLEAR => {
-                // Steps whose local errors add up to what is asked, and drift as errors of a frequency do.
+                // Local errors add up, and those of frequencies grow quadratically with time.
                 let steps = length / h;
                 let sum = apart * steps * (steps / 4.0).max(1.0);
                 let wanted = (accuracy / sum).powf(1.0 / order) / guess(order);
@@ -86,8 +86,9 @@ pub(super) fn probe(
     Err(failure.unwrap_or(RunErrorKind::Step { step: way.step }))
 }
 
-/// How much shorter than a probe says the second step is, so that it is mostly the last one: errors of high order fall with less than their power where steps are long, and
-/// a motion meets what its start does not show. The sum that low orders go by is more than errors add up to.
+/// A safety factor of the estimate, so that the second run is usually the last one: errors of high order decrease more
+/// slowly than their order says where steps are long, and the start does not show all phases of the motion. For low
+/// orders the sum of local errors overestimates the error.
 pub(super) fn guess(order: f64) -> f64 {
     if order > HIGH { 1.3 * LONGER } else { 0.9 }
 }

@@ -1,4 +1,4 @@
-//! What a search is asked for, the runs that it makes, and what all of it goes by.
+//! The specification of a search, the runs that it makes, and its tuned constants.
 
 use super::super::estimated::{Attempt, Picked};
 use super::super::grading::Grading;
@@ -8,29 +8,30 @@ use crate::numbers::larger;
 use std::ops::{ControlFlow, Range};
 use tfe_runtime::{Element, Solve, StepError};
 
-/// What is asked of a run.
+/// The specification of a search.
 #[derive(Clone, Debug)]
 pub(crate) struct Asked {
     pub(crate) accuracy: f64,
     pub(crate) span: Range<f64>,
-    /// Times at which elements have to end.
+    /// Times at which elements must end.
     pub(crate) breaks: Vec<f64>,
-    /// The element, where it is not to be picked.
+    /// The element, if it was chosen by the caller.
     pub(crate) element: Option<Element>,
     /// The longest step allowed.
     pub(crate) longest: Option<f64>,
-    /// Whether there is a fixed-point iteration.
+    /// Whether steps can be solved by fixed-point iteration.
     pub(crate) may_iterate: bool,
-    /// How elements are solved where it is not.
+    /// The solver for steps that are not.
     pub(crate) solve: Solve,
-    /// Where steps are to be long and where short; equal steps without it.
+    /// The grading of steps; `None` for equal steps.
     pub(crate) graded: Option<Graded>,
-    /// Whether every run goes beside one of the next order from its start: where Newton's method makes all steps, and no event changes the motion.
+    /// Whether runs are made in pairs of successive orders: if Newton's method solves all steps, and no event changes
+    /// the motion.
     pub(crate) in_pairs: bool,
 }
 
 impl Asked {
-    /// What the iteration of each of so many steps may leave.
+    /// The tolerance of the iterations of a run of so many steps.
     pub(super) fn tolerance(&self, steps: f64) -> f64 {
         let tolerance = ITERATION * self.accuracy / steps.max(1.0);
         if self.accuracy > ROUGH {
@@ -41,48 +42,49 @@ impl Asked {
     }
 }
 
-/// What a pilot run has found.
+/// The result of a pilot run.
 #[derive(Clone, Debug)]
 pub(crate) struct Graded {
     pub(crate) grading: Grading,
-    /// The element for it.
+    /// The element to use with it.
     pub(crate) element: Element,
-    /// A factor that is near.
+    /// An estimate of the factor.
     pub(crate) factor: f64,
 }
 
-/// One way to run.
+/// The settings of one run.
 #[derive(Clone, Debug)]
 pub(crate) struct Way<'a> {
     pub(crate) element: Element,
     pub(crate) tolerance: f64,
-    /// Whether a step that does not contract counts as one that fails.
+    /// Whether only the fixed-point iteration is used, so that a step without convergence fails.
     pub(crate) by_iteration: bool,
-    /// The longest step, positive; with a grading its factor.
+    /// The longest step, positive; with a grading, the factor.
     pub(crate) step: f64,
-    /// Start, times of comparison, end; between two of them steps are equal, or equal parts of the grading.
+    /// The start, the times of comparison and the end. Between two of them steps are equal, in time or in s(t).
     pub(crate) cuts: &'a [f64],
     pub(crate) grading: Option<&'a Grading>,
-    /// Whether it may be the motion that is asked for.
+    /// Whether the run is recorded, since it may be the result.
     pub(crate) keeps: bool,
 }
 
-/// What has come of a run.
+/// The result of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Ran {
     pub(crate) trace: Trace,
-    /// Whether a fixed-point iteration contracted in every step. Then steps are short beside all times of the model, and errors fall with the order of the element.
+    /// Whether the fixed-point iteration converged in every step. Steps are then short relative to all time scales of
+    /// the model, and errors decrease with the order of the element.
     pub(crate) contracts: bool,
 }
 
-/// What looks where steps have to be short, given the first one that it tries; nothing where equal steps are as good.
+/// Makes the pilot run, given its first step; `None` if equal steps are as good.
 pub(crate) type Pilot<'r> = dyn FnMut(f64) -> Option<Graded> + 'r;
 
-/// What makes runs.
+/// Makes the runs of a search.
 pub(crate) trait Runner {
-    /// One run.
+    /// Makes one run.
     fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed>;
-    /// A run that may be the motion that is asked for, and beside it another one over the same steps, until `judge` has seen enough.
+    /// Makes a recorded run, and beside it another one over the same steps, until `judge` ends both.
     fn run_beside(
         &mut self,
         way: &Way<'_>,
@@ -91,45 +93,46 @@ pub(crate) trait Runner {
     ) -> Result<RanBeside, Failed>;
 }
 
-/// Is shown every node that two runs have reached; says whether they go on.
+/// Called at every node that both runs have reached; the result says whether they continue.
 pub(crate) type Judge<'j> = dyn FnMut(&Beside<'_>) -> ControlFlow<()> + 'j;
 
-/// Where two runs are.
+/// The comparison of two runs at a node.
 pub(crate) struct Beside<'a> {
     pub(crate) time: f64,
-    /// How far they are apart, of each kind.
+    /// The largest difference of each kind.
     pub(crate) apart: &'a [f64],
-    /// The largest number of each kind so far.
+    /// The largest magnitude of each kind so far.
     pub(crate) sizes: &'a [f64],
 }
 
-/// What has come of two runs.
+/// The result of two runs.
 #[derive(Clone, Debug)]
 pub(crate) struct RanBeside {
     pub(crate) traces: [Trace; 2],
-    /// The nodes.
+    /// The times of the nodes.
     pub(crate) times: Vec<f64>,
-    /// Whether they have gone to their end.
+    /// Whether the end of the span was reached.
     pub(crate) is_complete: bool,
 }
 
-/// Why a run has stopped.
+/// The failure of a run.
 #[derive(Clone, Debug)]
 pub(crate) struct Failed {
     pub(crate) kind: RunErrorKind,
-    /// Whether steps of any length stop there.
+    /// Whether runs fail there with every step size.
     pub(crate) is_final: bool,
 }
 
 impl Failed {
-    /// Whether steps of any length stop there, as far as this failure and the last one before it tell: a function given for an input that has failed twice does so whatever the steps. Once may
-    /// be a single point, which other steps do not meet.
+    /// Whether runs fail with every step size, judging by this failure and the previous one. A user function for an
+    /// input that has failed twice will always fail; once may be a single point that other steps avoid.
     pub(crate) fn is_final_after(&self, before: Option<&RunErrorKind>) -> bool {
         let of_input = |kind: &RunErrorKind| matches!(kind, RunErrorKind::Input(_));
         self.is_final || of_input(&self.kind) && before.is_some_and(of_input)
     }
 
-    /// Whether the time has not the digits for the step: that says nothing of why longer ones have failed.
+    /// Whether the failure is that the time does not resolve the step; this says nothing about the failure of longer
+    /// steps.
     pub(super) fn is_unresolved(&self) -> bool {
         matches!(
             self.kind,
@@ -145,66 +148,71 @@ impl From<RunErrorKind> for Failed {
     }
 }
 
-/// What a search has found.
+/// The result of a search.
 #[derive(Clone, Debug)]
 pub(crate) struct Found {
     pub(crate) picked: Picked,
     pub(crate) times: Vec<f64>,
-    /// Of each kind at each time.
+    /// A list for each kind, with an error for every time.
     pub(crate) errors: Vec<Vec<f64>>,
     /// Whether the accuracy is met.
     pub(crate) is_met: bool,
 }
 
-/// What errors of the iteration may be of what is asked, all steps together: what they leave has the same sign in step after step.
+/// The error of the iterations, of all steps together, relative to the accuracy; it tends to have the same sign in
+/// every step.
 const ITERATION: f64 = 0.1;
-/// Iterations do not end earlier with less.
+/// The smallest tolerance of iterations.
 pub(super) const TIGHTEST: f64 = 1e-17;
-/// Above it roundings do not show, and what they take needs not be carried along.
+/// For accuracies above this, rounding errors do not matter, and compensated summation is not needed.
 const ROUGH: f64 = 0.99e-11;
-/// A first step longer than the second one by this factor costs two thirds of it.
+/// The ratio of the steps of the first and the second run; the first then costs two thirds of the second.
 pub(super) const COARSER: f64 = 1.5;
-/// A comparison with a run of an error above this says nothing about one with shorter steps.
+/// If the error of a run exceeds this, comparing it with one of shorter steps is meaningless.
 pub(super) const RESOLVED: f64 = 0.1;
-/// Steps have become a hundred times shorter then, and errors of each step less than a rounding: it is the motion that lets them grow.
+/// The number of meaningless comparisons after which the search ends. Steps have become a hundred times shorter by
+/// then, and their local errors smaller than rounding errors: the motion is chaotic.
 pub(super) const MOST_UNRESOLVED: u32 = 5;
-/// Runs over the whole span.
+/// The largest number of runs over the whole span.
 pub(super) const MOST_RUNS: usize = 14;
-/// Steps of a run: the nodes of more would take gigabytes, and a search that asks for them meets errors that do not fall with the order of its element.
+/// The largest number of steps of a run. The nodes of more would take gigabytes, and a search that asks for them has
+/// errors that do not decrease with the order of its element.
 pub(super) const MOST_STEPS: f64 = 1e7;
-/// Steps between two times of comparison: so many that steps can be chosen finely.
+/// The number of steps between two times of comparison; large enough that the step size can be chosen finely.
 pub(super) const STEPS_BETWEEN: f64 = 12.0;
 pub(super) const MOST_TIMES: f64 = 64.0;
-/// How much shorter the next step may be, and has to be.
+/// The limits of the factor between successive step sizes.
 pub(super) const LEAST_FACTOR: f64 = 0.4;
 pub(super) const MOST_FACTOR: f64 = 0.87;
-/// The first step that is tried is this part of the span.
+/// The first step that is tried is the span divided by this.
 pub(super) const FIRST: f64 = 8.0;
-/// Where steps will be more than this, another probe is cheap.
+/// If the run will have more steps than this, another probe is cheap.
 pub(super) const MANY_TO_PROBE: f64 = 24.0;
-/// An order is high above it.
+/// Orders above this are high.
 pub(super) const HIGH: f64 = 10.0;
-/// However much shorter the second step, errors are not believed to fall by more.
+/// The largest factor by which the error is assumed to decrease from one run to the next.
 pub(super) const MOST_GAIN: f64 = 150.0;
-/// The same where iterations of both runs end nearly alike: what they leave may have grown, and does not fall at all.
+/// The same if the iterations of both runs have about the same tolerance: their errors may have been amplified, and do
+/// not decrease.
 pub(super) const MOST_GAIN_MEASURED: f64 = 30.0;
-/// Errors do not fall smoothly where steps meet a pericentre now here, now there: by the estimate, steps longer by this factor have to be enough too.
+/// Safety factor of the step: by the estimate, a step longer by this factor must suffice. Errors do not decrease
+/// smoothly, for example if the steps near a pericentre are placed differently.
 pub(super) const LONGER: f64 = 1.2;
-/// The same where it was measured how errors fall with the step.
+/// The same if the order of convergence was measured.
 pub(super) const LONGER_MEASURED: f64 = 1.1;
-/// What is added to estimates for what iterations leave, which two runs have in common: relative to what is asked.
+/// An allowance for iteration errors that two runs have in common, relative to the accuracy; it is added to estimates.
 pub(super) const LEFT: f64 = 0.1;
-/// The next step aims a little beyond that.
+/// Safety factor of the next step.
 pub(super) const AIM: f64 = 1.13;
-/// Steps that differ by less tell nothing.
+/// The ratio of two steps below which their runs are not compared.
 pub(super) const SAME: f64 = 1.01;
-/// Differences below it that do not fall are of roundings.
+/// Differences below this that do not decrease are rounding errors.
 pub(super) const ROUNDINGS: f64 = 1e-6;
 
-/// What has come of runs with shorter and shorter steps.
+/// The result of runs with decreasing steps.
 pub(super) enum Climbed {
     Found(Box<Found>),
-    /// Steps would be more than they were allowed to be.
+    /// More steps would be needed than allowed.
     TooMany {
         attempts: Vec<Attempt>,
         step: f64,
@@ -222,13 +230,13 @@ pub(crate) fn next(element: Element) -> Option<Element> {
     same.validate().is_ok().then_some(same)
 }
 
-/// Whether steps of any length fail.
+/// Whether the failure occurs with every step size.
 fn slides(kind: &RunErrorKind) -> bool {
     let source = StepError::Slides;
     matches!(kind, RunErrorKind::Solve { source: found, .. } if *found == source)
 }
 
-/// The largest of all.
+/// The largest error.
 pub(super) fn largest(errors: &[Vec<f64>]) -> f64 {
     errors.iter().flatten().copied().fold(0.0, larger)
 }
