@@ -298,14 +298,14 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         follower.run(branch, Progress::new(self.progress))
     }
 
-    /// Which of the parameters of `sensitivity(…)` changes with the field.
+    /// The index and the name of the parameter of `sensitivity(…)` that changes with the field.
     fn sensitivity(
         &self,
         field: &Field<'m, M>,
     ) -> Result<(usize, &'static str), ContinuationErrorKind> {
         let mut moved = self.model.clone();
         let value = field(&mut moved);
-        // Another number whatever it is.
+        // Any other number.
         *value = if *value == 1.0 { 2.0 } else { 1.0 };
         let changes = |index: &usize| {
             self.model.sensitivity_parameter(*index).to_bits()
@@ -319,7 +319,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
             })
     }
 
-    /// Range and steps, checked.
+    /// The checked range and step sizes.
     fn course(&self, value: f64) -> Result<Course, ContinuationErrorKind> {
         let range = self.range.clone().ok_or(ContinuationErrorKind::NoRange)?;
         let Range { start, end } = range;
@@ -328,7 +328,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         if !(width.is_finite() && inside) {
             return Err(ContinuationErrorKind::Range { start, end, value });
         }
-        // What is given decides on the others.
+        // The sizes that were given determine the defaults of the others.
         let step = self.step.unwrap_or(0.0);
         let largest = self.largest.unwrap_or((0.05 * width).max(step));
         let smallest = (1e-6 * width)

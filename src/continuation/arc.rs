@@ -1,4 +1,4 @@
-//! Arc length along a branch, and the equations that fix a place on it.
+//! Arc length along a branch, and the equations that fix a point on it.
 
 use crate::assembly::{DenseMut, Iterate};
 use crate::periodic::problem::{Global, Periodic};
@@ -10,29 +10,33 @@ use tfe_runtime::State;
 /// ⟨a, b⟩ = λ_a λ_b + w² [ Σ_e h_e/T Σ_k (y_k,a y_k,b / Y_k²)_e + T_a T_b / T² ]
 /// ```
 ///
-/// with w the length of the range of λ and Y_k half the range of each coordinate and momentum y_k so far: an angle counts as much as a distance beside it, wherever that is counted from. Where
-/// the branch starts at rest ranges say nothing, so they are at least a hundredth of |∂y_k/∂λ| w there. The part h_e/T of an element makes it a mean over time, whatever the mesh.
+/// with w the length of the range of λ and Y_k half the range of each coordinate and momentum y_k so far: an angle
+/// counts as much as a distance, whatever its origin. If the branch begins at rest there are no ranges; they are
+/// therefore at least a hundredth of |∂y_k/∂λ| w. The weight h_e/T of an element makes the sum a mean over time that
+/// does not depend on the mesh.
 #[derive(Clone, Debug)]
 pub(super) struct Metric<const N: usize> {
-    /// The part of each node; none for the last, which is the first.
+    /// The weight of each node; none for the last, which equals the first.
     shares: Vec<f64>,
     width: f64,
-    /// The lowest value of each component so far, and the highest.
+    /// The least and the largest value of each component so far.
     bounds: [State<N>; 2],
-    /// What each component is measured by at least.
+    /// The smallest scale of each component.
     least: State<N>,
-    /// T, unless it is no unknown.
+    /// T, if it is an unknown.
     period: Option<f64>,
 }
 
-/// Ranges below this part of the largest component of their kind are roundings of it, as in one that is zero by symmetry.
+/// Ranges below this fraction of the largest component of their kind are rounding errors, as in a component that
+/// vanishes by symmetry.
 const ROUNDINGS: f64 = 1e-9;
 
-/// Ranges are this part of the values at least: arc length is to have some ten digits, whatever components are counted from.
+/// The smallest range relative to the values, so that arc length keeps about ten digits whatever the origin of a
+/// component.
 const OFFSET: f64 = 1e-5;
 
 impl<const N: usize> Metric<N> {
-    /// From the first orbit and its derivative by the parameter.
+    /// Begins with the first orbit and its derivative by the parameter.
     pub(super) fn new<M>(
         orbit: &Periodic<'_, M, N>,
         width: f64,
@@ -55,7 +59,7 @@ impl<const N: usize> Metric<N> {
         metric
     }
 
-    /// Takes one more orbit into account.
+    /// Extends the ranges by another orbit.
     pub(super) fn grow(&mut self, iterate: &Iterate<N>) {
         let [low, high] = &mut self.bounds;
         for node in &iterate.nodes {
@@ -68,7 +72,7 @@ impl<const N: usize> Metric<N> {
         }
     }
 
-    /// w / Y_k of all components. Their squares may be no numbers.
+    /// w / Y_k of all components. Not squared, since the squares may overflow or underflow.
     fn weights(&self) -> State<N> {
         let [low, high] = &self.bounds;
         let least = &self.least;
@@ -78,7 +82,7 @@ impl<const N: usize> Metric<N> {
         }
     }
 
-    /// The root of the weight of the k-th of `globals` unknowns: a period, an unfolding, the parameter.
+    /// The square root of the weight of the k-th of `globals` unknowns: a period, an unfolding parameter, or λ.
     fn global(&self, k: usize, globals: usize) -> f64 {
         if k + 1 == globals {
             1.0
@@ -89,7 +93,7 @@ impl<const N: usize> Metric<N> {
         }
     }
 
-    /// b ↦ ⟨a, b⟩ as numbers to multiply b with.
+    /// The linear form b ↦ ⟨a, b⟩, as coefficients of b.
     fn dual(&self, a: &Iterate<N>) -> (Vec<State<N>>, Vec<f64>) {
         let by = self.weights();
         let nodes = a.nodes.iter().zip(&self.shares);
@@ -110,13 +114,13 @@ impl<const N: usize> Metric<N> {
         pair(&nodes, &globals, b)
     }
 
-    /// Whether hardly anything is left of the way that an orbit goes, or that leads the other way round.
+    /// Whether an orbit has shrunk to almost nothing, or is traversed in the opposite phase.
     pub(super) fn withers(&self, from: &Iterate<N>, to: &Iterate<N>) -> bool {
-        /// A step that leaves less leads to rest or beyond it.
+        /// The smallest remaining fraction; a step that leaves less leads to rest or beyond.
         const LEFT: f64 = 0.1;
         let (from, to) = (way(from), way(to));
         let whole = self.product(&from, &from);
-        // A single element has no way from node to node.
+        // With a single element there are no differences between nodes.
         whole > 0.0 && self.product(&from, &to) < LEFT * whole
     }
 
@@ -127,7 +131,7 @@ impl<const N: usize> Metric<N> {
         a
     }
 
-    /// The place at an arc length from `base`, measured along the unit vector `tangent`.
+    /// The equation of the point at an arc length from `base`, measured along the unit vector `tangent`.
     pub(super) fn row(&self, base: &Iterate<N>, tangent: &Iterate<N>, length: f64) -> Row<N> {
         let (nodes, globals) = self.dual(tangent);
         let value = pair(&nodes, &globals, base) + length;
@@ -139,7 +143,7 @@ impl<const N: usize> Metric<N> {
     }
 }
 
-/// The way of an orbit from node to node.
+/// The differences between successive nodes of an orbit.
 fn way<const N: usize>(iterate: &Iterate<N>) -> Iterate<N> {
     let difference = |from: &[f64; N], to: &[f64; N]| std::array::from_fn(|a| to[a] - from[a]);
     let pairs = iterate.nodes.windows(2);
@@ -168,7 +172,8 @@ fn largest<const N: usize>(iterate: &Iterate<N>) -> State<N> {
     }
 }
 
-/// w over the half ranges of components of one kind, which are `least` at least; zero where a component is zero and stays so.
+/// w divided by the half ranges of the components of one kind, which are at least `least`; zero for a component that is
+/// identically zero.
 fn weights<const N: usize>(width: f64, [low, high]: [&[f64; N]; 2], least: &[f64; N]) -> [f64; N] {
     let largest = low.iter().chain(high);
     let largest = largest.fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -191,7 +196,8 @@ fn pair<const N: usize>(nodes: &[State<N>], globals: &[f64], b: &Iterate<N>) -> 
     sum + globals.map(|(weight, value)| weight * value).sum::<f64>()
 }
 
-/// The branch between two orbits u₀ and u₁: the cubic with their tangents, in x = ⟨τ₀, u − u₀⟩ / ⟨τ₀, u₁ − u₀⟩ ∈ [0, 1].
+/// The cubic interpolant of the branch between two orbits u₀ and u₁ with their tangents, in x = ⟨τ₀, u − u₀⟩ / ⟨τ₀, u₁
+/// − u₀⟩ ∈ [0, 1].
 pub(super) struct Between<const N: usize> {
     ends: [Iterate<N>; 2],
     /// u₁ − u₀.
@@ -204,7 +210,7 @@ pub(super) struct Between<const N: usize> {
 }
 
 impl<const N: usize> Between<N> {
-    /// Between two orbits with their unit tangents.
+    /// The interpolant between two orbits with their unit tangents.
     pub(super) fn new(
         metric: &Metric<N>,
         ends: [&Iterate<N>; 2],
@@ -224,7 +230,7 @@ impl<const N: usize> Between<N> {
         }
     }
 
-    /// The cubic.
+    /// The value of the cubic.
     pub(super) fn guess(&self, x: f64) -> Iterate<N> {
         let y = 1.0 - x;
         self.ends[0]
@@ -233,9 +239,10 @@ impl<const N: usize> Between<N> {
             .plus(-x * x * y, &self.slopes[1])
     }
 
-    /// Where the parameter leaves a range for the first time, and through which bound, which `left` tells. Behind a fold it may have come back, through a bound where it began, too.
+    /// The first point at which the parameter leaves its range, and the bound; `left` returns the bound that a
+    /// parameter exceeds. Behind a fold the branch may have returned through the bound at which it began.
     pub(super) fn exit(&self, left: impl Fn(f64) -> Option<f64>) -> Option<(f64, f64)> {
-        /// So many places are looked at.
+        /// The number of points that are examined.
         const PLACES: u32 = 64;
         let place = |k: u32| f64::from(k) / f64::from(PLACES);
         let bound_at = |x: f64| left(self.parameter(x));
@@ -261,18 +268,18 @@ impl<const N: usize> Between<N> {
             + x * y * (y * of(&self.slopes[0]) - x * of(&self.slopes[1]))
     }
 
-    /// The equation of a place.
+    /// The equation of the point at x.
     pub(super) fn row(&self, metric: &Metric<N>, x: f64) -> Row<N> {
         metric.row(&self.ends[0], &self.tangent, x * self.length)
     }
 }
 
-/// The equation that says where on the branch an orbit is.
+/// The equation that fixes the point on the branch.
 #[derive(Clone, Debug)]
 pub(super) enum Row<const N: usize> {
     /// λ = value.
     Parameter(f64),
-    /// ⟨τ, u⟩ = value, the weights of ⟨τ, ·⟩ being given.
+    /// ⟨τ, u⟩ = value, given by the coefficients of ⟨τ, ·⟩.
     Arc {
         nodes: Vec<State<N>>,
         globals: Vec<f64>,
@@ -281,7 +288,7 @@ pub(super) enum Row<const N: usize> {
 }
 
 impl<const N: usize> Row<N> {
-    /// The equation, linearised at an iterate.
+    /// Writes the equation, linearised at an iterate.
     pub(super) fn write(&self, iterate: &Iterate<N>, dense: DenseMut<'_>) {
         dense.nodes.fill(0.0);
         dense.global.fill(0.0);

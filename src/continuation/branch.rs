@@ -1,4 +1,4 @@
-//! A branch of periodic orbits: what continuation found.
+//! A branch of periodic orbits: the result of continuation.
 
 use super::events::EventKind;
 use crate::assembly::{Iterate, Mesh, Solution};
@@ -91,7 +91,7 @@ pub enum End {
     Rest,
 }
 
-/// What an orbit needs to be one again.
+/// The data from which an orbit of the branch is reconstructed.
 #[derive(Clone)]
 pub(super) struct Member<M, const N: usize> {
     pub(super) model: M,
@@ -101,21 +101,21 @@ pub(super) struct Member<M, const N: usize> {
     pub(super) unfolding: f64,
 }
 
-/// What all orbits of a branch have in common.
+/// The data common to all orbits of a branch.
 #[derive(Clone, Debug)]
 pub(super) struct Frame<const N: usize> {
     pub(super) element: Element,
     pub(super) mesh: Mesh,
     pub(super) start: f64,
     pub(super) advance: [f64; N],
-    /// How many multipliers are one.
+    /// The number of trivial multipliers.
     pub(super) trivial: usize,
-    /// Whether there is an unfolding force.
+    /// Whether there is an unfolding force (an additional unknown of conservative models).
     pub(super) unfolded: bool,
 }
 
 impl<const N: usize> Frame<N> {
-    /// An orbit.
+    /// Reconstructs an orbit.
     pub(super) fn orbit<'b, M: Model<N>>(
         &self,
         member: &'b Member<M, N>,
@@ -244,7 +244,7 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
     pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
         let mut names = vec!["period".to_owned()];
         names.extend((0..N).map(|a| format!("amplitude_{}", M::coordinate_name(a))));
-        // Constraints leave fewer.
+        // With constraints there are fewer multipliers.
         let multipliers = self.points.first().map(|point| point.multipliers.len());
         for k in 1..=multipliers.unwrap_or(2 * N) {
             names.extend([format!("multiplier{k}_re"), format!("multiplier{k}_im")]);
@@ -264,7 +264,7 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
 }
 
 impl<M, const N: usize> fmt::Debug for Branch<M, N> {
-    /// The extent of the branch, not its thousands of numbers.
+    /// The extent of the branch, without its thousands of numbers.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let parameter = |point: &Point<N>| point.parameter;
         let events = self.events.iter();
@@ -282,7 +282,7 @@ impl<M, const N: usize> fmt::Debug for Branch<M, N> {
     }
 }
 
-/// Half the range of each coordinate over the period of an orbit, less its steady growth.
+/// Half the range of each coordinate over the period of an orbit, without its steady growth.
 pub(super) fn amplitudes<M: Model<N>, const N: usize>(
     orbit: &Orbit<'_, M, N>,
     advance: &[f64; N],
@@ -307,10 +307,11 @@ pub(super) fn amplitudes<M: Model<N>, const N: usize>(
     })
 }
 
-/// Places in an element, its first node included.
+/// The number of samples in an element, including its first node.
 const SAMPLES: u32 = 4;
 
-/// The largest value of a periodic function given at ascending places: the top of the parabola through the largest value and its neighbours.
+/// The maximum of a periodic function given at ascending points, by the parabola through the largest value and its
+/// neighbours.
 fn largest(values: &[(f64, f64)], period: f64) -> f64 {
     let by_value = |a: &usize, b: &usize| values[*a].1.total_cmp(&values[*b].1);
     let Some(top) = (0..values.len()).max_by(by_value) else {
@@ -339,7 +340,7 @@ mod tests {
 
     #[test]
     fn the_top_of_a_parabola_is_exact_also_across_the_period() {
-        // 1 − (t − 0.05)² in the neighbourhood of t = 0, with period 1 and uneven places.
+        // 1 − (t − 0.05)² near t = 0, with period 1 and unequal spacing.
         let value = |t: f64| 1.0 - (t - 0.05) * (t - 0.05);
         let values = [
             (0.0, value(0.0)),
@@ -349,7 +350,7 @@ mod tests {
         ];
         assert!((largest(&values, 1.0) - 1.0).abs() < 1e-15);
         assert_eq!(largest(&[(0.0, 2.0), (0.5, 2.0)], 1.0), 2.0);
-        // In units whose squares are no numbers.
+        // In units in which squares overflow or underflow.
         for (size, time) in [(1e100, 1e-100), (1e-100, 1e100)] {
             let values = values.map(|(t, value)| (t * time, value * size));
             assert!((largest(&values, time) / size - 1.0).abs() < 1e-14);

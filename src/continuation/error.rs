@@ -1,4 +1,4 @@
-//! Why a branch could not be followed.
+//! The errors of continuation.
 
 use super::branch::Branch;
 use crate::periodic::OrbitError;

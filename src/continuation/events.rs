@@ -1,4 +1,4 @@
-//! Functions of an orbit that change sign where something happens on its branch.
+//! Test functions: functions of an orbit that change sign at a bifurcation of its branch.
 
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
@@ -21,21 +21,21 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// All of them.
+    /// All kinds.
     pub(super) const ALL: [Self; 4] = [Self::Fold, Self::PeriodDoubling, Self::Torus, Self::Branch];
 }
 
-/// What the test functions of an orbit are made of.
+/// The data from which the test functions are computed.
 pub(super) struct Circumstances<'a> {
-    /// The parameter's part of the unit tangent.
+    /// The component of the unit tangent along the parameter.
     pub(super) slope: f64,
-    /// The sign of the determinant of the equations with an equation of arc length.
+    /// The sign of the determinant of the equations, including the equation of arc length.
     pub(super) sign: f64,
     /// The multipliers.
     pub(super) floquet: &'a [Multiplier],
-    /// The places of those that are always one.
+    /// The indices of the trivial multipliers.
     pub(super) trivial: &'a [usize],
-    /// Whether multipliers come in pairs μ, 1/μ, which are on the circle together.
+    /// Whether multipliers come in pairs μ, 1/μ, which reach the unit circle together.
     pub(super) symplectic: bool,
 }
 
@@ -48,15 +48,17 @@ pub(super) struct Circumstances<'a> {
 /// branch           ±∏ (μ_i − 1) / (|μ_i| + 1) ,   the sign that of the determinant of all equations
 /// ```
 ///
-/// over the multipliers that are not trivial, with the size of the smallest factor. The denominators keep the factors bounded and have no zeros. The determinant changes
-/// sign where branches cross, not at folds, where the product does; only together do they tell the two apart and show by how much.
+/// over the nontrivial multipliers; of each product, the size is that of its smallest factor. The denominators keep the
+/// factors bounded and have no zeros. The determinant changes sign where branches cross, but not at folds, where the
+/// product does; only both together distinguish the two and give a size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tests {
     values: [f64; 4],
 }
 
-/// A product of factors none of which is larger than one, as a number that changes its sign where the product does: the smallest factor, turned as the product is. The
-/// product of many is rounding though none is near a zero.
+/// The product of factors of modulus at most one, replaced by a number with the same changes of sign: the smallest
+/// factor with the phase of the product. A product of many factors could be rounding error although no factor is close
+/// to zero.
 fn product(factors: impl Iterator<Item = Complex<f64>>) -> f64 {
     let (mut turned, mut least) = (Complex::new(1.0, 0.0), 1.0_f64);
     for factor in factors {
@@ -97,7 +99,7 @@ impl Tests {
         self.values[kind as usize]
     }
 
-    /// The events between two orbits: test functions that have changed sign, from and to values beyond round-off.
+    /// The events between two orbits: test functions that change sign between values beyond rounding error.
     pub(super) fn changes(&self, next: &Self) -> impl Iterator<Item = EventKind> {
         let (before, after) = (*self, *next);
         EventKind::ALL.into_iter().filter(move |kind| {
@@ -107,7 +109,8 @@ impl Tests {
     }
 }
 
-/// The signs that the test functions had last along a branch, where they were more than round-off; zero where they were not yet.
+/// The last signs of the test functions along a branch, ignoring values within rounding error; zero if there was none
+/// yet.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Signs {
     last: [f64; 4],
@@ -123,7 +126,8 @@ impl Signs {
         }
     }
 
-    /// The events at an orbit itself, the last that was passed: test functions that are round-off there, and have the other sign at the next one.
+    /// The events exactly at the last orbit: test functions that vanish there up to rounding error and have the
+    /// opposite sign at the next one.
     pub(super) fn changes_at(&self, at: &Tests, next: &Tests) -> impl Iterator<Item = EventKind> {
         let (signs, at, next) = (self.last, *at, *next);
         EventKind::ALL.into_iter().filter(move |kind| {
@@ -133,10 +137,12 @@ impl Signs {
     }
 }
 
-/// A function that vanishes identically, because multipliers are tied to each other, is not larger than this.
+/// The bound below which a test function counts as zero, as one that vanishes identically because of a symmetry of the
+/// multipliers.
 const ROUND_OFF: f64 = 1e-9;
 
-/// Whether a zero of the test function of tori is one: the pair with product one is complex. Two real multipliers μ, 1/μ mean nothing.
+/// Whether a zero of the torus test function is a torus bifurcation: the pair with product one must be complex, since
+/// two real multipliers μ, 1/μ have no meaning.
 pub(super) fn is_torus(floquet: &[Multiplier], trivial: &[usize]) -> bool {
     let others: Vec<Multiplier> = (0..floquet.len())
         .filter(|place| !trivial.contains(place))
@@ -155,7 +161,7 @@ fn pairs(multipliers: &[Multiplier]) -> impl Iterator<Item = (&Multiplier, &Mult
     firsts.flat_map(move |(i, one)| rest(i).map(move |other| (one, other)))
 }
 
-/// μ / |μ|, real where μ is.
+/// μ / |μ|, real if μ is.
 fn unit(multiplier: &Multiplier) -> Complex<f64> {
     Multiplier {
         log_modulus: 0.0,
@@ -164,7 +170,7 @@ fn unit(multiplier: &Multiplier) -> Complex<f64> {
     .to_complex()
 }
 
-/// (μ − σ) / (|μ| + 1), also where |μ| is no `f64`.
+/// (μ − σ) / (|μ| + 1), also if |μ| exceeds the range of `f64`.
 fn beside(log_modulus: f64, unit: Complex<f64>, sigma: f64) -> Complex<f64> {
     let small = (-log_modulus.abs()).exp();
     let difference = if log_modulus > 0.0 {
@@ -193,7 +199,8 @@ mod tests {
     }
 
     fn at(slope: f64, floquet: &[Multiplier]) -> Tests {
-        // The determinant by the parameter fixed has the sign of ∏ (μ − 1); the one by arc length that over the slope.
+        // The determinant at fixed parameter has the sign of ∏ (μ − 1); that with arc length has this sign divided by
+        // that of the slope.
         let product: f64 = floquet
             .iter()
             .map(|one| {
@@ -263,7 +270,7 @@ mod tests {
         assert_eq!(along(&[0.2, 0.1, -0.1, -0.2]), [(1, fold)]);
         assert_eq!(along(&[0.2, 0.1, 0.0, -0.1, -0.2]), [(2, fold)]);
         assert_eq!(along(&[-0.2, 1e-12, 0.1]), [(1, fold)]);
-        // One that begins there, touches, or ends there does not turn.
+        // A function that is zero at the beginning or the end, or only touches zero, does not change its sign.
         for slopes in [&[0.0, -0.1, -0.2][..], &[0.1, 0.0, 0.1], &[0.1, 0.0]] {
             assert!(along(slopes).is_empty(), "{slopes:?}");
         }
@@ -288,7 +295,7 @@ mod tests {
         assert!(!is_torus(&real, &[]));
         let complex = [multiplier(1.0, 0.4), multiplier(1.0, -0.4)];
         assert!(is_torus(&complex, &[]));
-        // Beside the trivial multiplier, a conjugate pair.
+        // The trivial multiplier and a conjugate pair.
         let cycle = [
             multiplier(1.0, 0.4),
             multiplier(1.0, -0.4),
@@ -299,7 +306,7 @@ mod tests {
 
     #[test]
     fn what_vanishes_identically_is_no_event() {
-        // The product of an undamped, forced pair is one up to round-off, on either side.
+        // The product of an undamped pair under forcing is one up to rounding error of either sign.
         let pair = |noise: f64| at(1.0, &[multiplier(1.0 + noise, 0.4), multiplier(1.0, -0.4)]);
         check(&pair(1e-14), &pair(-1e-14), &[]);
     }

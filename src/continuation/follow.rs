@@ -1,4 +1,4 @@
-//! Following a branch: predictor, corrector, length of steps, and the search for events between two orbits.
+//! Follows a branch: predictor, corrector, step size control, and the search for bifurcations between two orbits.
 
 use super::arc::{Between, Metric, Row};
 use super::branch::{Branch, End, Event, Frame, Member, Point, Tangent, amplitudes};
@@ -15,7 +15,7 @@ use crate::stability::chebyshev::bracketed_root;
 use std::ops::Range;
 use tfe_runtime::{Element, Model};
 
-/// The lengths of steps, in arc length.
+/// The step sizes, in arc length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Steps {
     pub(super) first: f64,
@@ -23,7 +23,7 @@ pub(super) struct Steps {
     pub(super) largest: f64,
 }
 
-/// Where a branch goes.
+/// The range of the parameter and the steps of a continuation.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
     pub(super) range: Range<f64>,
@@ -32,7 +32,7 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// The end of the range that a parameter is beyond, if any.
+    /// The end of the range that a parameter exceeds, if any.
     fn left(&self, parameter: f64) -> Option<f64> {
         let (low, high) = (
             self.range.start.min(self.range.end),
@@ -48,14 +48,14 @@ impl Course {
     }
 }
 
-/// An orbit with what is needed to go on from it.
+/// An orbit with the data needed to continue from it.
 #[derive(Clone)]
 struct Solved<M, const N: usize> {
     member: Member<M, N>,
     floquet: Vec<Multiplier>,
-    /// Of unit length.
+    /// A unit vector.
     tangent: Iterate<N>,
-    /// dT/dλ, where the period is a function of the parameter.
+    /// dT/dλ, if the period is a given function of the parameter.
     rate: f64,
     tests: Tests,
     iterations: u32,
@@ -68,25 +68,25 @@ impl<M, const N: usize> Solved<M, N> {
     }
 }
 
-/// A step that was taken.
+/// A successful step.
 struct Step<M, const N: usize> {
     next: Solved<M, N>,
     /// The cosine of the angle between the tangents.
     turn: f64,
-    /// Whether an end of the range is reached.
+    /// Whether an end of the range was reached.
     ended: bool,
 }
 
-/// An event.
+/// A located event.
 struct Located<M, const N: usize> {
-    /// How much of the way between two points it is.
+    /// Its position between the two orbits, from 0 to 1.
     part: f64,
     solved: Solved<M, N>,
-    /// How far the parameter is known.
+    /// The uncertainty of the parameter.
     width: f64,
 }
 
-/// A branch that is being followed.
+/// The state of a continuation.
 pub(super) struct Follower<'c, M, const N: usize> {
     problem: Continued<'c, M, N>,
     assembly: Assembly<N>,
@@ -95,12 +95,12 @@ pub(super) struct Follower<'c, M, const N: usize> {
     metric: Metric<N>,
     frame: Frame<N>,
     last: Solved<M, N>,
-    /// Of the test functions up to the last orbit.
+    /// The signs of the test functions up to the last orbit.
     signs: Signs,
 }
 
 impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
-    /// At the first orbit, about which the iterate is already right, up to a tolerance.
+    /// Starts at the first orbit, with its iterate known up to the tolerance.
     pub(super) fn start(
         mut problem: Continued<'c, M, N>,
         mut iterate: Iterate<N>,
@@ -138,7 +138,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             signs,
             problem,
             assembly,
-            // A step that needs more is too long.
+            // If more iterations are needed, the step is too long.
             control: Control {
                 max_iterations: MOST_ITERATIONS,
                 ..control
@@ -158,7 +158,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
     ) -> Result<(), ContinuationErrorKind> {
         branch.frame = Some(self.frame.clone());
         self.record(branch);
-        // The first step is one of the parameter.
+        // The first step is measured in the parameter.
         let slope = self.last.tests.value(EventKind::Fold).abs();
         let Steps {
             first,
@@ -241,29 +241,30 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         }
     }
 
-    /// Goes on from an orbit.
+    /// Continues from an orbit.
     fn accept(&mut self, next: Solved<M, N>) {
         self.last = next;
         self.signs.pass(&self.last.tests);
         self.metric.grow(&self.last.member.iterate);
-        // The length of a vector has changed.
+        // The metric has changed, and with it the length of the tangent.
         self.last.tangent = self.metric.unit(self.last.tangent.clone());
     }
 
-    /// The place at an arc length from the last orbit along its tangent.
+    /// The predictor: the point at an arc length from the last orbit along its tangent.
     fn ahead(&self, length: f64) -> Iterate<N> {
         let last = &self.last;
         last.member.iterate.plus(length, &last.tangent)
     }
 
-    /// Whether a place ahead is one of rest, or beyond one: from there the branch would go back over the same orbits, half a period later. Where time decides on the phase, rest is a
-    /// motion as any other.
+    /// Whether a predicted orbit is at rest or beyond: the branch would then return over the same orbits, with the
+    /// opposite phase. Orbits whose phase is fixed by time may pass through rest.
     fn comes_to_rest(&self, ahead: &Iterate<N>) -> bool {
         let last = &self.last.member.iterate;
         self.problem.orbit.phase.is_some() && self.metric.withers(last, ahead)
     }
 
-    /// The orbit at an arc length from the last one, or at the end of the range before it. Without an error the branch turned too much, or came to rest.
+    /// The orbit at an arc length from the last one, or at the end of the range before that. `Err(None)` if the branch
+    /// turned too much, or came to rest.
     fn step(&mut self, length: f64) -> Result<Step<M, N>, Option<OrbitError>> {
         let last = &self.last;
         let guess = self.ahead(length);
@@ -294,7 +295,8 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         })
     }
 
-    /// Newton's method from a guess; the solution, and the cosine of the angle between its tangent and the last one.
+    /// The corrector: Newton's method from a guess. Returns the solution, and the cosine of the angle between its
+    /// tangent and the last one.
     fn correct(
         &mut self,
         mut iterate: Iterate<N>,
@@ -308,7 +310,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         if let (Row::Parameter(value), Some(parameter)) =
             (&self.problem.row, iterate.globals.last_mut())
         {
-            // Exactly, not up to round-off.
+            // Exactly, not only up to rounding error.
             *parameter = *value;
             self.problem.set_globals(&iterate.globals);
         }
@@ -323,7 +325,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         Ok((solved, turn))
     }
 
-    /// Looks for events at the last orbit and between that and the next, and records them.
+    /// Looks for events at the last orbit and between it and the next one, and records them.
     fn find_events(&mut self, next: &Solved<M, N>, branch: &mut Branch<M, N>) {
         let at_last = self.signs.changes_at(&self.last.tests, &next.tests);
         let at_last = at_last.map(|kind| (kind, true));
@@ -355,7 +357,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         }
     }
 
-    /// The last orbit, where a test function vanishes.
+    /// The event exactly at the last orbit.
     fn at_last(&mut self, next: &Solved<M, N>, kind: EventKind) -> Located<M, N> {
         if kind == EventKind::Branch {
             let between = self.between(next);
@@ -372,11 +374,11 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         }
     }
 
-    /// The orbit where a test function vanishes, between the last one and the next.
+    /// Locates the event at which a test function vanishes, between the last orbit and the next.
     fn locate(&mut self, next: &Solved<M, N>, kind: EventKind) -> Located<M, N> {
         let between = self.between(next);
         let values = [&self.last, next].map(|end| end.tests.value(kind));
-        // The nearest orbit on either side of the root.
+        // The closest orbits on both sides of the root.
         let mut low = (0.0, self.last.clone());
         let mut high = (1.0, next.clone());
         let near = if kind == EventKind::Branch {
@@ -384,7 +386,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         } else {
             0.0
         };
-        // Where a trial fails the search ends with what it has.
+        // If a trial fails, the best result so far is used.
         let root = bracketed_root(
             |part| {
                 let solved = self.trial(&between, part)?;
@@ -419,7 +421,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         }
     }
 
-    /// The branch between the last orbit and the next.
+    /// The interpolant of the branch between the last orbit and the next.
     fn between(&self, next: &Solved<M, N>) -> Between<N> {
         let ends = [&self.last, next];
         Between::new(
@@ -429,16 +431,17 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         )
     }
 
-    /// An orbit between the last one and the next.
+    /// Solves an orbit between the last one and the next.
     fn trial(&mut self, between: &Between<N>, part: f64) -> Result<Solved<M, N>, OrbitError> {
         let row = between.row(&self.metric, part);
         Ok(self.correct(between.guess(part), row)?.0)
     }
 
-    /// The orbit where another branch crosses, near a place between the last one and the next.
+    /// Locates the orbit at which another branch crosses, between the last orbit and the next.
     ///
-    /// The equations are singular there: Newton's method finds it to the root of round-off at best, and may leave the branch. But the branch
-    /// itself is smooth, so orbits at a distance on both sides are solved, and polynomials through them evaluated where the test function vanishes.
+    /// The equations are singular there: Newton's method would find the orbit only to the square root of the rounding
+    /// error, and could change to the other branch. Since the branch is smooth, orbits at some distance on both sides
+    /// are solved, and the polynomial through them is evaluated at the zero of the test function.
     fn crossing(&mut self, between: &Between<N>, part: f64) -> Result<Located<M, N>, OrbitError> {
         let places = STENCIL.map(|k| part + k * SPACING);
         let mut orbits = Vec::with_capacity(places.len());
@@ -449,7 +452,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             .iter()
             .map(|orbit| orbit.tests.value(EventKind::Branch))
             .collect();
-        // Once from all, once without the outermost two, to see the difference.
+        // Once with all orbits, and once without the outermost two: the difference estimates the error.
         let root = |from: usize, to: usize| {
             let weights = lagrange(&values[from..to], 0.0);
             let terms = weights.iter().zip(&places[from..to]);
@@ -474,7 +477,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         let tangent = self.metric.unit(blend(&|orbit| &orbit.tangent));
         self.problem.set_globals(&iterate.globals);
         match self.assembly.linearise(&self.problem, &iterate) {
-            // The matrices of the elements are all that is wanted.
+            // Linearised only for the transition matrices.
             Ok(()) | Err(AssemblyError::Singular { .. }) => {}
             Err(error) => return Err(error.into()),
         }
@@ -487,7 +490,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
     }
 }
 
-/// The weights of the polynomial through given places, at x.
+/// The Lagrange weights for points at `places`, evaluated at x.
 fn lagrange(places: &[f64], x: f64) -> Vec<f64> {
     let weight = |(k, place): (usize, &f64)| {
         let others = places.iter().enumerate().filter(|(other, _)| *other != k);
@@ -498,13 +501,15 @@ fn lagrange(places: &[f64], x: f64) -> Vec<f64> {
     places.iter().enumerate().map(weight).collect()
 }
 
-/// Places about the crossing of another branch, in units of [`SPACING`].
+/// The positions of the solved orbits about a branch point, in units of [`SPACING`].
 const STENCIL: [f64; 6] = [-3.0, -2.0, -1.0, 1.0, 2.0, 3.0];
 
-/// A part of the way between two points: the sixth power is below 10⁻¹⁰, and the singular place some way off.
+/// The spacing of these orbits relative to the step: its sixth power is below 10⁻¹⁰, and the closest orbit is
+/// sufficiently far from the singular one.
 const SPACING: f64 = 0.02;
 
-/// The part of its larger end value below which the test function of a crossing need not be known before interpolation.
+/// The value of the test function, relative to its larger end value, at which the root is close enough for
+/// interpolation.
 const NEAR: f64 = 1e-2;
 
 /// An orbit from a converged iterate.
@@ -516,7 +521,7 @@ fn solved<M: Model<N> + Clone, const N: usize>(
     iterations: u32,
 ) -> Result<Solved<M, N>, OrbitError> {
     let transitions = assembly.transitions().to_vec();
-    // What the constraints allow, they do at this parameter.
+    // The motions that the constraints allow are evaluated at the current parameter.
     let orbit = Periodic {
         model: &problem.model,
         ..problem.orbit.clone()
@@ -524,7 +529,7 @@ fn solved<M: Model<N> + Clone, const N: usize>(
     let floquet = multipliers_of(&orbit, &iterate.nodes, &transitions)?;
     let trivial = trivial_of(&floquet, orbit.trivial());
     let slope = tangent.globals.last().copied().unwrap_or(f64::NAN);
-    // With the parameter given instead of the arc length the determinant is dλ/ds times as large.
+    // The determinant at fixed parameter is dλ/ds times that with arc length.
     let sign = match problem.row {
         Row::Parameter(_) => assembly.sign() * slope.signum(),
         Row::Arc { .. } => assembly.sign(),
@@ -563,14 +568,15 @@ fn adapted(step: f64, iterations: u32, turn: f64) -> f64 {
     }
 }
 
-/// A corrector that takes more says that the step was too long.
+/// The largest number of Newton iterations; more indicate that the step was too long.
 const MOST_ITERATIONS: u32 = 8;
 
-/// Where the smallest step fails, a branch has come to rest if that lies within so many of these: the equations lose digits near it.
+/// If the smallest step fails, the branch has come to rest if rest lies within this number of smallest steps: the
+/// equations lose digits close to it.
 const NEAR_REST: f64 = 10.0;
 
-/// The cosine of 25°: a branch does not turn by more in a step.
+/// The cosine of 25°, the largest angle between successive tangents.
 const MOST_TURN: f64 = 0.906;
 
-/// The cosine of 10°: below this angle steps may grow.
+/// The cosine of 10°, the angle below which steps may grow.
 const EASY_TURN: f64 = 0.985;

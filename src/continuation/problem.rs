@@ -1,4 +1,5 @@
-//! The equations of one orbit of a branch: those of a periodic orbit, with a parameter of the model as one more unknown.
+//! The equations of one orbit of a branch: those of a periodic orbit, with a parameter of the model as additional
+//! unknown.
 
 use super::arc::Row;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Problem};
@@ -7,7 +8,7 @@ use crate::periodic::problem::{Periodic, energy_slopes};
 use tfe_runtime::condenser::{Direction, Parameter};
 use tfe_runtime::{LegendreError, Model};
 
-/// The field of a model that is the parameter.
+/// Accesses the field of a model that is the parameter.
 pub(super) type Field<'c, M> = dyn Fn(&mut M) -> &mut f64 + 'c;
 
 /// The period as a function of the model.
@@ -20,15 +21,15 @@ pub(super) struct Continued<'c, M, const N: usize> {
     /// The orbit at the start of the branch, with the current period and unfolding.
     pub(super) orbit: Periodic<'c, M, N>,
     pub(super) field: &'c Field<'c, M>,
-    /// The place of λ in [`Model::SENSITIVITIES`].
+    /// The index of λ in [`Model::SENSITIVITIES`].
     pub(super) sensitivity: usize,
-    /// T(λ), where it is known.
+    /// T(λ), if it is given.
     pub(super) period: Option<&'c PeriodOf<'c, M>>,
     /// dT/dλ.
     pub(super) rate: f64,
     /// The length of the range of λ.
     pub(super) width: f64,
-    /// What fixes the place on the branch.
+    /// The equation that fixes the point on the branch.
     pub(super) row: Row<N>,
 }
 
@@ -44,7 +45,8 @@ impl<'c, M: Model<N> + Clone, const N: usize> Continued<'c, M, N> {
         model
     }
 
-    /// The derivative of a number by λ, which may change much within a small part of a wide range.
+    /// The derivative of a number by λ. A small step is used, since the number may vary much within a small part of the
+    /// range.
     fn difference(&self, value: impl Fn(&M) -> f64) -> f64 {
         let parameter = self.parameter();
         let distance = 1e-3 * parameter.abs().max(1e-2 * self.width);
@@ -114,7 +116,7 @@ impl<M: Model<N> + Clone, const N: usize> Problem<N> for Continued<'_, M, N> {
         if orbit.energy.is_none() {
             return Ok(());
         }
-        // The energy is the last row, the parameter the last column.
+        // The energy is the last row, and the parameter the last column.
         if let (Some(entry), Some(first)) = (closure.global.last_mut(), iterate.nodes.first()) {
             *entry = self.difference(|model| {
                 let found = energy_slopes(model, orbit.start, first);

@@ -1,4 +1,4 @@
-//! The progress of a branch, on standard error.
+//! Progress of a continuation, on standard error.
 
 /// A line on standard error, rewritten once a second.
 pub(super) struct Progress {
@@ -22,7 +22,7 @@ impl Progress {
         }
         *shown = std::time::Instant::now();
         self.is_dirty = true;
-        // Progress that cannot be shown is no reason to stop.
+        // Errors of the display are ignored.
         let _ = write!(
             std::io::stderr(),
             "\r{points} orbits, parameter {parameter:.6} "

@@ -1,4 +1,4 @@
-//! Why there is no periodic orbit.
+//! The errors of periodic orbits.
 
 use crate::assembly::{AssemblyError, MeshError};
 use crate::error::RunErrorKind;

@@ -26,7 +26,7 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
         orbit_of(self.solved()?)
     }
 
-    /// The equations and their solution.
+    /// Solves the equations.
     fn solved(&self) -> Result<Shooting<'m, M>, OrbitError> {
         let period = self.period.checked()?;
         self.check_numbers()?;
@@ -70,7 +70,7 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
         };
         let guess = extent(&shooting);
         let solved = shooting.solve(self.control);
-        // Where a phase is asked for, a motion is.
+        // If a phase condition is given, an equilibrium is not accepted.
         if shooting.phase.is_some()
             && may_rest(&solved)
             && is_at_rest(extent(&shooting), &guess, || shooting.motion())
@@ -81,7 +81,7 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
         Ok(shooting)
     }
 
-    /// The states of the guess at the nodes.
+    /// The states of the first guess at the nodes.
     fn nodes(&self, mesh: &Mesh, period: f64) -> Result<Vec<FamilyState>, OrbitError> {
         let n = self.model.len();
         let state = |t: f64, (q, v): (Vec<f64>, Vec<f64>)| {
@@ -113,7 +113,7 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
     }
 }
 
-/// An orbit with its multipliers.
+/// The orbit of a solution, with its multipliers.
 fn orbit_of<M: family::Model>(
     shooting: Shooting<'_, M>,
 ) -> Result<Orbit<'_, M, 0, RunTimeLength>, OrbitError> {

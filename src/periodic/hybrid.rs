@@ -1,4 +1,4 @@
-//! Periodic orbits of motions with events that change the state: impacts, switches.
+//! Periodic orbits of motions with events that change the state, such as impacts and switches (single shooting).
 
 use super::error::OrbitError;
 use super::orbit::{Verdict, sort, trivial_of};
@@ -159,7 +159,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     /// found from the guess, [`AtRest`](OrbitError::AtRest) if the search for an unknown period ends at an
     /// equilibrium, [`HybridConstraints`](OrbitError::HybridConstraints) for models with constraints.
     pub fn solve(&self) -> Result<HybridOrbit<N>, OrbitError> {
-        /// Corrections below this that shrink no more are roundings.
+        /// Corrections below this that no longer decrease are rounding errors.
         const ROUNDED: f64 = 1e-9;
         const MAX_HALVINGS: u32 = 12;
         if const { !M::CONSTRAINTS.is_empty() } {
@@ -225,14 +225,14 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
                 }
                 part *= 0.5;
             }
-            // Nothing is better than roundings.
+            // The correction is rounding error, so that no step can improve the residual.
             let is_best = tried.is_err() && size < ROUNDED;
             if !is_best {
                 (state, period, run) = tried?;
                 self.check_moves(&run, &guess)?;
             }
             if is_done || is_best {
-                // What no correction changes may be left: then the motion does not close.
+                // A residual that no correction reduces means that the motion does not close.
                 let residual = largest(self.residual(&run, &scales).as_slice());
                 if residual <= self.tolerance.max(ROUNDED) * gain.max(1.0) {
                     return self.found(run, state, period, iterations);
@@ -251,7 +251,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         })
     }
 
-    /// Refuses a motion that goes nowhere where the period is unknown: of a known one an equilibrium is an orbit.
+    /// Refuses an equilibrium if the period is unknown; with a known period it is a valid orbit.
     fn check_moves(&self, run: &Linearised<N>, guess: &Extent) -> Result<(), OrbitError> {
         let motion = run.motion();
         let is_free = matches!(self.period, Period::Guess(_));
@@ -261,7 +261,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         Ok(())
     }
 
-    /// Those of another simulation.
+    /// The same problem for another simulation.
     pub(super) fn of(&self, simulation: Simulation<'m, M, N>) -> Self {
         Self {
             simulation,
@@ -280,13 +280,13 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         let run = run.map_err(|error| OrbitError::Run(error.kind().clone()))?;
         let last = run.motion().last().t;
         if last != self.start + period {
-            // An event has stopped it.
+            // An event has stopped the run.
             return Err(OrbitError::Stopped { time: last });
         }
         Ok(run)
     }
 
-    /// y(T) − y(0) − (0, advance), ordered (p, q), in parts of the scales.
+    /// y(T) − y(0) − (0, advance), in the order (p, q), divided by the scales.
     fn residual(&self, run: &Linearised<N>, scales: &Scales) -> DVector<f64> {
         let nodes = run.motion().states();
         let (first, last) = (&nodes[0], run.motion().last());
@@ -325,9 +325,10 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         })
     }
 
-    /// Whether a multiplier is one because the model does not depend on time. Where the period is known it need not be: acts may depend on time, and a state of rest has none.
+    /// Whether one multiplier is 1 because the model is autonomous. With a known period this need not be so: actions
+    /// may depend on time, and an equilibrium has no such multiplier.
     fn trivial(&self, floquet: &[Multiplier], motion: &Motion<N>) -> bool {
-        /// How near to one it is at least.
+        /// The largest distance of that multiplier from 1.
         const NEAR: f64 = 1e-4;
         if matches!(self.period, Period::Guess(_)) {
             return true;
@@ -338,30 +339,30 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     }
 }
 
-/// A correction of an orbit.
+/// A Newton correction of an orbit.
 pub(super) struct Correction {
-    /// Of the start, ordered (p, q), in parts of the scales.
+    /// The change of the start, in the order (p, q), divided by the scales.
     pub(super) start: DVector<f64>,
-    /// Of the period.
+    /// The change of the period.
     pub(super) stretch: f64,
-    /// By how much a correction is multiplied over a period, at most.
+    /// The largest singular value of the equations: the largest factor from a correction to the residual.
     pub(super) gain: f64,
 }
 
-/// The linear equations of an orbit that closes.
+/// The linearised equations of periodicity.
 pub(super) struct Closing<'a> {
-    /// The derivative of the end by the start, ordered (p, q).
+    /// The derivative of the end by the start, in the order (p, q).
     pub(super) product: DMatrix<f64>,
-    /// What a unit of the period does to the end, where it is unknown.
+    /// The derivative of the end by the period, if that is unknown.
     pub(super) rate: Option<DVector<f64>>,
     pub(super) scales: &'a Scales,
     pub(super) period: f64,
 }
 
 impl Closing<'_> {
-    /// The shortest correction.
+    /// The least-norm correction.
     pub(super) fn shortest(&self, residual: &DVector<f64>) -> Result<Correction, OrbitError> {
-        /// Singular values below this, of the largest, are zeros: of families of orbits.
+        /// Singular values below this, relative to the largest, count as zero; they belong to families of orbits.
         const ZERO: f64 = 1e-9;
         let size = residual.len();
         let scale = |row: usize| self.scales.of(row);
@@ -377,7 +378,7 @@ impl Closing<'_> {
             residual: largest(residual.as_slice()),
             iterations: 0,
         };
-        // Of other numbers the decomposition would never end.
+        // The singular value decomposition would not terminate.
         let mut entries = matrix.iter().chain(residual.iter());
         if !entries.all(|entry| entry.is_finite()) {
             return Err(stalled);
@@ -399,23 +400,24 @@ impl Closing<'_> {
     }
 }
 
-/// By what coordinates and momenta are measured.
+/// The scales of coordinates and momenta.
 pub(super) struct Scales {
     pub(super) q: f64,
     pub(super) p: f64,
-    /// Of each, ordered (p, q).
+    /// The scale of each component, in the order (p, q).
     own: Vec<f64>,
 }
 
 impl Scales {
-    /// That of a row, ordered (p, q).
+    /// The scale of a component, in the order (p, q).
     pub(super) fn of(&self, row: usize) -> f64 {
         self.own[row]
     }
 }
 
-/// All of a kind are measured by the largest of them, but those that are much smaller, as an angle beside a distance, by themselves. What is smaller still holds roundings of the largest, such as what is
-/// zero by symmetry.
+/// The scale of all components of a kind is the largest of them. Much smaller components, such as an angle beside a
+/// distance, have scales of their own, unless they are small enough to be rounding errors of the largest, as components
+/// that vanish by symmetry.
 pub(super) fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
     const SMALL: f64 = 1e-3;
     const ROUNDINGS: f64 = 1e-12;
@@ -441,7 +443,8 @@ pub(super) fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
     Scales { q, p, own }
 }
 
-/// The first parameter that events have left with another value than a model has: with it the next period is another motion.
+/// The first parameter that events have left at another value than at the start: the motion of the next period would
+/// differ.
 fn left_over<'s, M: Model<N>, const N: usize>(
     model: &M,
     settings: &'s [Setting],
@@ -457,7 +460,7 @@ fn left_over<'s, M: Model<N>, const N: usize>(
     left.map(|(_, one)| one)
 }
 
-/// ẏ = (ṗ, q̇).
+/// The flow ẏ = (ṗ, q̇).
 fn rate<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,

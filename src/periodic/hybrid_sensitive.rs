@@ -1,4 +1,4 @@
-//! Orbits with events, with their derivatives by parameters.
+//! Periodic orbits with events, with their derivatives by parameters.
 
 use super::error::OrbitError;
 use super::hybrid::{Closing, Correction, HybridOrbit, HybridOrbits, scales};
@@ -77,7 +77,8 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
         })
     }
 
-    /// What a unit of the period does to the end, ordered (p, q), where all elements become longer: a difference of eighth order.
+    /// The derivative of the end by the period, in the order (p, q), all elements being stretched: a difference of
+    /// eighth order.
     fn by_length(&self, start: State<N>, period: f64) -> Result<DVector<f64>, OrbitError> {
         let mut sum = DVector::zeros(2 * N);
         for place in places(moving::distance_of_period(period, self.elements)) {
@@ -89,7 +90,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> HybridOrbits<'m, M, N> 
         Ok(sum)
     }
 
-    /// How multipliers move where start and period move so, with a parameter or with the period alone.
+    /// The derivatives of the multipliers, given those of start and period, by a parameter or by the period alone.
     fn moving(
         &self,
         orbit: &HybridOrbit<N>,

@@ -1,4 +1,4 @@
-//! What closes orbits of models of either kind of length.
+//! The interface between periodic orbits and the two kinds of length of models.
 
 use crate::assembly::Solution;
 use crate::length::{FixedLength, Length};

@@ -1,4 +1,4 @@
-//! How multipliers move with a parameter (T-157).
+//! Derivatives of Floquet multipliers by a parameter, from difference quotients (T-157).
 
 use crate::differences::{NEARER, PART, WELL_KNOWN, is_next_to_zero, places};
 use crate::numbers::largest;
@@ -6,10 +6,11 @@ use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
 use std::f64::consts::PI;
 
-/// The largest difference between two orders of a derivative with which it counts as known; the better one is nearer.
+/// The largest relative difference between the estimates of two orders for which a derivative is returned; that of
+/// higher order is more accurate.
 const KNOWN: f64 = 1e-7;
 
-/// The distance of differences by a parameter of this value, where unit steps of it move things by such parts of their sizes.
+/// The difference step for a parameter of a given value; `parts` are relative changes per unit of the parameter.
 fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 {
     let of_itself = if value == 0.0 { 0.0 } else { 1.0 / value.abs() };
     let largest = parts.into_iter().fold(of_itself, f64::max);
@@ -19,12 +20,14 @@ fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 {
     }
 }
 
-/// The distance of differences by a period that so many elements make up: ends move by a small part of an element, however often the motion goes to and fro in a period.
+/// The difference step for a period of a number of elements: ends move by a small fraction of an element, however often
+/// the motion oscillates in a period.
 pub(super) fn distance_of_period(period: f64, elements: usize) -> f64 {
     distance(period, [elements as f64 / period])
 }
 
-/// The distances that are tried: that by a parameter, after that by one that is zero where nothing sees the size of the parameter, in parts of which multipliers change by roundings.
+/// The difference steps to try. For a parameter so small that its relative changes affect the multipliers only by
+/// rounding errors, the step for the value zero is tried first.
 pub(super) fn distances(value: f64, parts: [f64; 3]) -> Vec<f64> {
     let own = distance(value, parts);
     let largest = parts.into_iter().fold(0.0, f64::max);
@@ -34,7 +37,7 @@ pub(super) fn distances(value: f64, parts: [f64; 3]) -> Vec<f64> {
     }
 }
 
-/// The largest of some changes, in parts of the largest of what changes; zero where that is.
+/// The largest change relative to the largest value; zero if all values are zero.
 pub(super) fn part(changes: &[f64], of: &[f64]) -> f64 {
     let size = largest(of);
     if size > 0.0 {
@@ -44,8 +47,9 @@ pub(super) fn part(changes: &[f64], of: &[f64]) -> f64 {
     }
 }
 
-/// The derivatives of multipliers, from those at places near by, at first as far apart as the first distance says, then nearer where that does not tell them; none where it never does, as where
-/// multipliers meet. Trivial ones stay.
+/// The derivatives of the multipliers from their values at shifted parameters `at`, with decreasing difference steps
+/// until two orders agree; `None` if they never do, for example where multipliers coincide. Trivial multipliers stay
+/// one.
 pub(super) fn derivatives(
     multipliers: &[Multiplier],
     trivial: &[usize],
@@ -60,7 +64,7 @@ pub(super) fn derivatives(
     for place in trivial {
         best[*place].off = 0.0;
     }
-    // By the first distance, so that nearer ones are not judged more mildly.
+    // Relative to the first step, so that shorter steps are not judged less strictly.
     let unit = PART / distances.first().copied().unwrap_or(PART);
     let tried = distances.iter();
     for distance in tried.flat_map(|distance| NEARER.map(|nearer| nearer * distance)) {
@@ -79,7 +83,8 @@ pub(super) fn derivatives(
         .collect()
 }
 
-/// A derivative of a logarithm, and what two orders of differences are apart, with roundings of the logarithms, as a part of it or of one that moves it by as much as whatever moves most.
+/// The derivative of the logarithm of a multiplier, and its error: the difference of two orders plus rounding error,
+/// relative to the derivative or to the fastest relative change.
 #[derive(Clone, Copy)]
 struct Known {
     logarithm: Complex<f64>,
@@ -108,7 +113,7 @@ fn differences(
     sums.into_iter().map(known).collect()
 }
 
-/// The logarithm of the multiplier nearest to one, over it; NaN where there is none.
+/// The logarithm of the ratio of the closest multiplier in a list to a given one; NaN if the list is empty.
 fn nearest(own: &Multiplier, others: &[Multiplier]) -> Complex<f64> {
     let turned = |other: &Multiplier| {
         let angle = other.argument - own.argument;

@@ -1,4 +1,4 @@
-//! A periodic orbit, solved.
+//! Periodic orbits that were found.
 
 use super::error::OrbitError;
 use super::kind::{Chained, Closed};
@@ -54,7 +54,8 @@ impl Verdict {
     /// decides nothing.
     pub const NEUTRAL: f64 = 1e-7;
 
-    /// From all multipliers but the trivial ones, by their places. Without any, neighbours neither come nearer nor go away: an oscillator of one coordinate.
+    /// The verdict from all multipliers except the trivial ones, which are given by index. If there are no others, as
+    /// for an oscillator with one coordinate, the orbit is neutral.
     pub(crate) fn of(floquet: &[Multiplier], trivial: &[usize]) -> Self {
         let others = (0..floquet.len()).filter(|place| !trivial.contains(place));
         let moduli = others.map(|place| floquet[place].modulus());
@@ -110,7 +111,7 @@ impl<'m, M: Model<N>, const N: usize> Orbit<'m, M, N> {
 }
 
 impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
-    /// From a solved chain and its multipliers.
+    /// The orbit of a solved chain, with its multipliers.
     pub(crate) fn of_solution(
         solution: L::Solution<'m>,
         floquet: Vec<Multiplier>,
@@ -295,7 +296,8 @@ impl<'m, M, const N: usize, L: Closed<M, N>> fmt::Display for Orbit<'m, M, N, L>
     }
 }
 
-/// The multipliers of a chain of matrices, the largest first; with constraints, those of the motions that these allow.
+/// The multipliers of a chain of transition matrices, the largest first; with constraints, those of the motions that
+/// the constraints allow.
 pub(crate) fn multipliers_of<M: Model<N>, const N: usize>(
     problem: &Periodic<'_, M, N>,
     nodes: &[State<N>],
@@ -318,7 +320,7 @@ pub(crate) fn multipliers_of<M: Model<N>, const N: usize>(
     Ok(floquet)
 }
 
-/// The largest modulus first.
+/// Sorts by modulus, the largest first.
 pub(crate) fn sort(floquet: &mut [Multiplier]) {
     floquet.sort_by(|a, b| {
         let by_modulus = b.log_modulus.total_cmp(&a.log_modulus);
@@ -326,7 +328,7 @@ pub(crate) fn sort(floquet: &mut [Multiplier]) {
     });
 }
 
-/// The places of the `count` multipliers nearest to one.
+/// The indices of the `count` multipliers closest to one.
 pub(crate) fn trivial_of(floquet: &[Multiplier], count: usize) -> Vec<usize> {
     let mut places: Vec<usize> = (0..floquet.len()).collect();
     let distance = |place: &usize| {

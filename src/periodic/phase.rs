@@ -1,4 +1,4 @@
-//! Which orbit is meant, and its period.
+//! Phase conditions, and the period.
 
 use super::error::OrbitError;
 

@@ -10,21 +10,22 @@ use tfe_runtime::{
     Element, First, Form, LegendreError, Model, State, Statistics, StepError, constrained, legendre,
 };
 
-/// What the global unknowns of an orbit are.
+/// A global unknown of an orbit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Global {
     /// The period T.
     Period,
-    /// The force γ v that unfolds the families of a conservative model; zero in the solution, up to discretization.
+    /// The coefficient of the force γ v that unfolds the families of a conservative model; zero in the solution up to
+    /// the discretisation error.
     Unfolding,
 }
 
 impl Global {
-    /// What a correction of it is measured by.
+    /// The scale relative to which corrections are measured.
     pub(crate) fn scale(self, period: f64, inertia: f64) -> f64 {
         match self {
             Self::Period => period,
-            // A force that acts within a period.
+            // A force that would act strongly within a period.
             Self::Unfolding => inertia / period,
         }
     }
@@ -38,14 +39,14 @@ pub(crate) struct Periodic<'m, M, const N: usize> {
     pub(crate) start: f64,
     pub(crate) period: f64,
     pub(crate) unfolding: f64,
-    /// Of the guess: Σ p·v / Σ v·v, by which a force γ v is measured.
+    /// Σ p·v / Σ v·v of the guess, by which γ is scaled.
     pub(crate) inertia: f64,
     pub(crate) globals: Vec<Global>,
-    /// How much the coordinates grow over a period.
+    /// The increase of the coordinates over a period.
     pub(crate) advance: [f64; N],
-    /// Which of the orbits that differ in phase; `None` where time or the guess decides.
+    /// The phase condition; `None` if time or the guess fixes the phase.
     pub(crate) phase: Option<Phase>,
-    /// The energy at the start.
+    /// The energy at the start, if it is prescribed.
     pub(crate) energy: Option<f64>,
 }
 
@@ -74,27 +75,27 @@ impl<'m, M, const N: usize> Periodic<'m, M, N> {
 }
 
 impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
-    /// How many equations run over all nodes.
+    /// The number of equations over all nodes.
     pub(crate) fn dense(&self) -> usize {
         usize::from(self.phase == Some(Phase::Orthogonal))
     }
 
-    /// Whether a solution is an orbit.
+    /// Checks that a solution is an orbit.
     pub(crate) fn check(&self) -> Result<(), OrbitError> {
         check(self.period, self.unfolding, self.inertia)
     }
 
-    /// The row Σ h_e ẏ_e · δy_e = 0 of a few elements, with the flow by the equations of motion.
+    /// The row Σ h_e ẏ_e · δy_e = 0 for few elements, with the flow from the equations of motion.
     fn orthogonal_to_flow_at(&self, nodes: &[State<N>], weights: &mut [f64]) {
         weights.fill(0.0);
         for (element, weights) in weights.chunks_exact_mut(2 * N).enumerate() {
             if element == self.mesh.elements() {
-                // The last node is the first one a period later.
+                // The last node is the first one, one period later.
                 break;
             }
             let (time, length) = self.place(element);
             let flow = flow_at(self.model, time, &nodes[element]);
-            // Where there is none the equations are singular, which says so.
+            // If there is none, the equations are singular and report it.
             let [by_p, by_q] = flow.unwrap_or([[0.0; N]; 2]);
             for a in 0..N {
                 weights[a] = length * by_p[a];
@@ -103,14 +104,15 @@ impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
         }
     }
 
-    /// How many multipliers are one: none of a forced orbit, one of an autonomous, two of a conservative one.
+    /// The number of trivial multipliers: zero for a forced orbit, one for an autonomous model, two for a conservative
+    /// one.
     pub(crate) fn trivial(&self) -> usize {
         let unfolded = self.globals.contains(&Global::Unfolding);
         usize::from(self.phase.is_some()) * (1 + usize::from(unfolded))
     }
 }
 
-/// Σ p·v / Σ v·v over places of a guess, their momenta and velocities one after the other; one where it does not move.
+/// Σ p·v / Σ v·v over samples of a guess, given as concatenated momenta and velocities; one if the guess is at rest.
 pub(crate) fn inertia_of(p: &[f64], v: &[f64]) -> f64 {
     let speed = norm(v);
     let action: f64 = p.iter().zip(v).map(|(p, v)| p * (v / speed)).sum();
@@ -122,19 +124,19 @@ pub(crate) fn inertia_of(p: &[f64], v: &[f64]) -> f64 {
     }
 }
 
-/// Whether a solution is an orbit.
+/// Checks that a solution is an orbit.
 pub(crate) fn check(period: f64, unfolding: f64, inertia: f64) -> Result<(), OrbitError> {
     if !(period > 0.0) {
         return Err(OrbitError::Period { period });
     }
-    // Damping that takes a percent of the motion over a period is no discretization error.
+    // Damping that takes one percent of the motion over a period is more than a discretisation error.
     if !(unfolding.abs() * period < 1e-2 * inertia) {
         return Err(OrbitError::NoFamily { unfolding });
     }
     Ok(())
 }
 
-/// The rows of periodicity: y_E − y_0 = (0, advance).
+/// Writes the rows of periodicity: y_E − y_0 = (0, advance).
 pub(crate) fn close_periodically<const N: usize>(
     advance: &[f64; N],
     iterate: &Iterate<N>,
@@ -153,12 +155,13 @@ pub(crate) fn close_periodically<const N: usize>(
     }
 }
 
-/// With fewer elements the nodes before and behind a node are one, a period apart: they say nothing of the flow.
+/// The least number of elements for which the two neighbours of a node differ, so that their difference approximates
+/// the flow.
 pub(crate) const NEIGHBOURED: usize = 3;
 
-/// The row Σ h_e ẏ_e · δy_e = 0: the correction is orthogonal to the flow, so that the phase of the guess stays.
+/// The row Σ h_e ẏ_e · δy_e = 0: the correction is orthogonal to the flow, so that the phase of the guess is kept.
 ///
-/// The flow is the difference of the neighbours; a condition of phase need not be exact.
+/// The flow is approximated by the difference of the neighbours; a phase condition need not be exact.
 fn orthogonal_to_flow<const N: usize>(advance: &[f64; N], nodes: &[State<N>], weights: &mut [f64]) {
     let last = nodes.len() - 1;
     for e in 0..last {
@@ -177,7 +180,7 @@ fn orthogonal_to_flow<const N: usize>(advance: &[f64; N], nodes: &[State<N>], we
     weights[last * 2 * N..].fill(0.0);
 }
 
-/// The rate ṗ of the momenta without what constraints add: L_q + Q.
+/// The rate ṗ of the momenta without reactions of constraints: L_q + Q.
 pub(super) fn force_at<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
@@ -193,7 +196,8 @@ pub(super) fn force_at<M: Model<N>, const N: usize>(
     std::array::from_fn(|a| sign * first.q[a] + first.force[a])
 }
 
-/// The flow ẏ = (ṗ, q̇) at a state, by the equations of motion, ordered (p, q); none where no velocity belongs to the momentum, or no reactions.
+/// The flow ẏ = (ṗ, q̇) at a state, from the equations of motion, in the order (p, q); `None` if no velocity belongs to
+/// the momentum, or there are no reactions.
 fn flow_at<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
@@ -215,7 +219,7 @@ fn flow_at<M: Model<N>, const N: usize>(
     Some([force, v])
 }
 
-/// The velocity of a momentum; where it has none of its own, the one that constraints leave.
+/// The velocity of a momentum; if the kinetic energy does not determine it, the one that the constraints determine.
 fn velocity_of<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
@@ -229,7 +233,7 @@ fn velocity_of<M: Model<N>, const N: usize>(
     })
 }
 
-/// H with (H_p, H_q).
+/// H and its gradient (H_p, H_q).
 pub(crate) fn energy_slopes<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
@@ -247,7 +251,7 @@ pub(crate) fn energy_slopes<M: Model<N>, const N: usize>(
     Ok((energy, v, first.q.map(|slope| -slope)))
 }
 
-/// ∂H/∂a at fixed coordinates and momenta, which is −∂L/∂a at fixed velocities.
+/// ∂H/∂a at fixed coordinates and momenta; equal to −∂L/∂a at fixed velocities.
 fn energy_by<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,

@@ -1,21 +1,21 @@
-//! Whether a motion is at rest: an equilibrium, which repeats after any time.
+//! Detects motions at rest: an equilibrium repeats after any time and is no periodic orbit.
 
 use super::error::OrbitError;
 use crate::assembly::AssemblyError;
 use crate::length::{Length, Polynomial};
 use crate::motion::Motion;
 
-/// What a search for an orbit leaves of the motion of a coordinate at rest, beside the largest value that the coordinate had: some of its roundings, as many as the condition of the
-/// equations makes of them.
+/// The residual motion of a coordinate at rest after Newton's method, relative to its largest value: its rounding
+/// error, amplified by the condition of the equations.
 const LEFT: f64 = 1e-11;
 
-/// The same beside the largest of all coordinates, roundings of which those hold that are zero.
+/// The same relative to the largest of all coordinates; their rounding errors are in coordinates that vanish.
 const ROUNDINGS: f64 = 32.0 * f64::EPSILON;
 
-/// So many places of each element are looked at where all nodes are one.
+/// The number of samples in each element, if all nodes coincide.
 const PLACES: u32 = 16;
 
-/// Between which values each coordinate lies.
+/// The least and the largest value of each coordinate.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Extent {
     low: Vec<f64>,
@@ -23,7 +23,7 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Of some places.
+    /// The extent of several points.
     pub(super) fn of<'a>(places: impl IntoIterator<Item = &'a [f64]>) -> Self {
         let mut extent = Self::default();
         for q in places {
@@ -32,7 +32,7 @@ impl Extent {
         extent
     }
 
-    /// Of the nodes of a motion.
+    /// The extent of the nodes of a motion.
     pub(super) fn of_nodes<const N: usize, L: Length<N>>(motion: &Motion<N, L>) -> Self {
         Self::of(motion.states().iter().map(|node| node.q.as_ref()))
     }
@@ -46,7 +46,7 @@ impl Extent {
         }
     }
 
-    /// With the places inside the elements of a motion.
+    /// Includes samples inside the elements of a motion.
     fn add_inside<const N: usize, L: Length<N>>(&mut self, motion: &Motion<N, L>) {
         let pieces = motion.elements().iter().flat_map(Polynomial::pieces);
         for piece in pieces {
@@ -58,24 +58,25 @@ impl Extent {
         }
     }
 
-    /// The largest value of each coordinate.
+    /// The largest magnitude of each coordinate.
     fn sizes(&self) -> impl Iterator<Item = f64> {
         let bounds = self.low.iter().zip(&self.high);
         bounds.map(|(low, high)| low.abs().max(high.abs()))
     }
 
-    /// Whether each coordinate stays where it is, up to roundings of the values that it has or had in the guess.
+    /// Whether each coordinate is constant, up to the rounding error of its values now or in the guess.
     fn is_point(&self, guess: &Self) -> bool {
         let sizes = self.sizes().zip(guess.sizes());
         let sizes: Vec<f64> = sizes.map(|(own, guess)| own.max(guess)).collect();
         let largest = sizes.iter().fold(0.0_f64, |most, size| most.max(*size));
         let mut ways = self.low.iter().zip(&self.high).zip(&sizes);
-        // What is not a number is no rest.
+        // A NaN is not at rest.
         ways.all(|((low, high), size)| high - low <= (LEFT * size).max(ROUNDINGS * largest))
     }
 }
 
-/// Whether a motion goes nowhere: neither from node to node nor, where all nodes are one, within elements. Beside the values that coordinates have, and had in the guess.
+/// Whether a motion is constant, at its nodes and, if these coincide, inside the elements; relative to the values of
+/// the coordinates now and in the guess.
 pub(super) fn is_at_rest<const N: usize, L: Length<N>>(
     mut nodes: Extent,
     guess: &Extent,
@@ -84,12 +85,12 @@ pub(super) fn is_at_rest<const N: usize, L: Length<N>>(
     if !nodes.is_point(guess) {
         return false;
     }
-    // The end of each element may be that of a period.
+    // The length of each element may be a period.
     nodes.add_inside(&motion());
     nodes.is_point(guess)
 }
 
-/// Whether a search that ends so may have come to rest: equations of an orbit are singular there.
+/// Whether this outcome of a search is possible at rest, where the equations of an orbit are singular.
 pub(super) fn may_rest(solved: &Result<(), OrbitError>) -> bool {
     matches!(
         solved,
@@ -113,13 +114,13 @@ mod tests {
     #[test]
     fn a_motion_is_measured_by_the_coordinates_and_by_the_guess() {
         let guess = extent(&[[1.0, 0.0], [-1.0, 0.0]]);
-        // What is left of a guess that moved, and roundings of another coordinate in one that is zero.
+        // The residue of a guess that moved, and the rounding error of another coordinate in one that vanishes.
         assert!(extent(&[[1e-17, 0.0], [-1e-16, 2e-17]]).is_point(&guess));
         assert!(!extent(&[[1e-9, 0.0], [-1e-9, 0.0]]).is_point(&guess));
-        // Units make no difference.
+        // The result does not depend on units.
         let small = extent(&[[1e-120, 0.0], [-1e-120, 0.0]]);
         assert!(!small.is_point(&small));
-        // An angle beside a distance that stays.
+        // An angle beside a constant distance.
         let far = extent(&[[1.5e11, -1.0], [1.5e11, 1.0]]);
         assert!(!far.is_point(&far));
         let still = extent(&[[1.5e11, 1e-6], [1.5e11, -1e-6]]);

@@ -1,4 +1,4 @@
-//! Orbits with their derivatives by parameters.
+//! Periodic orbits with their derivatives by parameters.
 
 use super::error::OrbitError;
 use super::moving;
@@ -85,7 +85,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     }
 }
 
-/// What a change does to one of the globals; zero where it is given.
+/// The derivative of one of the globals; zero if it is given.
 fn global<M, const N: usize>(
     problem: &Periodic<'_, M, N>,
     change: &Iterate<N>,
@@ -95,13 +95,13 @@ fn global<M, const N: usize>(
     place.map_or(0.0, |place| change.globals[place])
 }
 
-/// An orbit that moves with a parameter, or with its period.
+/// The family of orbits along a parameter, or along the period.
 struct Moving<'a, 'm, M, const N: usize> {
     element: Element,
     problem: &'a Periodic<'m, M, N>,
     iterate: &'a Iterate<N>,
     change: &'a Iterate<N>,
-    /// ∂T/∂a
+    /// ∂T/∂a.
     period: f64,
 }
 
@@ -123,7 +123,7 @@ impl<'m, M: Model<N>, const N: usize> Moving<'_, 'm, M, N> {
         })
     }
 
-    /// What a unit of the parameter does to states and to the period, in parts of their sizes.
+    /// The relative changes of states and period per unit of the parameter.
     fn parts(&self) -> [f64; 3] {
         let part = |of: fn(&State<N>) -> &[f64; N]| {
             let all = |iterate: &'_ Iterate<N>| -> Vec<f64> {
@@ -138,7 +138,7 @@ impl<'m, M: Model<N>, const N: usize> Moving<'_, 'm, M, N> {
         ]
     }
 
-    /// Those of the matrices where the parameter has moved so far, and the orbit with it.
+    /// The multipliers if the parameter is shifted and the orbit moves with it to first order.
     fn multipliers(&self, model: &M, shift: f64) -> Option<Vec<Multiplier>> {
         let moved = self.iterate.plus(shift, self.change);
         let unfolding = global(self.problem, self.change, Global::Unfolding);

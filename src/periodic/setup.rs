@@ -1,4 +1,4 @@
-//! A periodic orbit to be found, and how it is found.
+//! The definition of a periodic orbit to be found, and of how it is solved.
 
 use super::error::OrbitError;
 use super::kind::Closed;
@@ -15,7 +15,7 @@ use tfe_runtime::{Element, LegendreError, Mixed, Model, Statistics, constrained,
 /// A curve t ↦ (q, dq/dt).
 type Around<'m, V> = Box<dyn Fn(f64) -> (V, V) + 'm>;
 
-/// Where Newton's method starts.
+/// The first guess of Newton's method.
 pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
     Rest,
     Curve(Around<'m, L::Vector>),
@@ -84,7 +84,7 @@ pub struct PeriodicOrbit<'m, M, const N: usize, L: Length<N> = FixedLength> {
     pub(super) guess: Guess<'m, N, L>,
     pub(super) phase: Phase,
     pub(super) energy: Option<f64>,
-    /// Zeros where it is not chosen.
+    /// `None`: zeros.
     pub(super) advance: Option<L::Vector>,
     pub(super) control: Control,
 }
@@ -213,7 +213,7 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         self
     }
 
-    /// Refuses numbers of which no equations can be made.
+    /// Refuses numbers that are not finite.
     pub(super) fn check_numbers(&self) -> Result<(), OrbitError> {
         let phase = match self.phase {
             Phase::Coordinate { value, .. } | Phase::Momentum { value, .. } => value,
@@ -230,7 +230,7 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         })
     }
 
-    /// Refuses an energy where something else decides on it.
+    /// Refuses a prescribed energy for models in which other conditions determine it.
     pub(super) fn check_energy(&self, conservative: bool) -> Result<(), OrbitError> {
         let of = match (self.energy, self.period) {
             (None, _) => return Ok(()),
@@ -264,7 +264,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         Orbit::new(self.element, &problem, iterate, &assembly)
     }
 
-    /// The equations and their solution.
+    /// Solves the equations.
     pub(crate) fn solved(&self) -> Result<Solved<'m, M, N>, OrbitError> {
         let period = self.period.checked()?;
         self.check_numbers()?;
@@ -324,7 +324,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
                 .and_then(|()| self.check_resolved(&problem, &iterate, &assembly));
         }
         let solved = (solved.map_err(OrbitError::from)).and_then(|()| problem.check());
-        // Where a phase is asked for, a motion is.
+        // If a phase condition is given, an equilibrium is not accepted.
         if problem.phase.is_some()
             && may_rest(&solved)
             && is_at_rest(extent_of(&iterate), &guess, || {
@@ -337,7 +337,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         Ok((problem, iterate, assembly))
     }
 
-    /// Refuses a forced orbit that elements of half the length do not leave as it is: one at resonance.
+    /// Refuses a forced orbit that elements of half the length do not confirm, as at resonance.
     fn check_resolved(
         &self,
         problem: &Periodic<'_, M, N>,
@@ -371,7 +371,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         solution.motion()
     }
 
-    /// The element, and how a solution is iterated.
+    /// The element and the stopping criteria.
     pub(crate) fn method(&self) -> (Element, Control) {
         (self.element, self.control)
     }
@@ -403,7 +403,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         })
     }
 
-    /// Whether the guess does not move: an equilibrium, whose multipliers are asked for.
+    /// Whether the guess is constant: an equilibrium whose multipliers are asked for.
     fn is_constant(&self, curve: &Curve<'_, N>, period: f64) -> bool {
         let (first, _) = curve(self.start);
         (0..=16).all(|k| {
@@ -440,15 +440,15 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     }
 }
 
-/// Between which values the coordinates of the nodes lie.
+/// The least and the largest coordinates of the nodes.
 fn extent_of<const N: usize>(iterate: &Iterate<N>) -> Extent {
     Extent::of(iterate.nodes.iter().map(|node| &node.q[..]))
 }
 
-/// The equations of an orbit, their solution and the memory that it took.
+/// The equations of an orbit, their solution, and the workspace.
 pub(crate) type Solved<'m, M, const N: usize> = (Periodic<'m, M, N>, Iterate<N>, Assembly<N>);
 
-/// Coordinates and velocities of a motion; its last ones beyond its end.
+/// Coordinates and velocities of a motion; beyond its end, the last ones.
 pub(crate) fn along_motion<M: Model<N>, const N: usize>(
     model: &M,
     motion: &Motion<N>,

@@ -1,12 +1,12 @@
-//! Numbers with an exponent of their own, reflections and rotations.
+//! Numbers with a separate exponent, reflections and rotations.
 
 use nalgebra::Complex;
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2};
 use std::ops::Range;
 
-/// x · 2^exponent, without overflow on the way.
+/// x · 2^exponent, without intermediate overflow.
 pub(super) fn times_power_of_two(mut x: f64, exponent: i64) -> f64 {
-    // 2^±2200 takes every finite number to zero or infinity.
+    // A factor of 2^±2200 takes every finite number to zero or infinity.
     let mut left = exponent.clamp(-2200, 2200);
     while left != 0 {
         let part = left.clamp(-1000, 1000);
@@ -16,12 +16,12 @@ pub(super) fn times_power_of_two(mut x: f64, exponent: i64) -> f64 {
     x
 }
 
-/// 2^exponent, as near as a normal number comes to it.
+/// 2^exponent, limited to normal numbers.
 pub(crate) fn power_of_two(exponent: i64) -> f64 {
     f64::from_bits(((1023 + exponent.clamp(-1022, 1023)) as u64) << 52)
 }
 
-/// The integer e with 2^e ≤ |x| < 2^(e+1), of a finite number; −1075 for zero, below that of every other.
+/// The integer e with 2^e ≤ |x| < 2^(e+1) of a finite number; −1075 for zero, less than for every other number.
 pub(crate) fn exponent(x: f64) -> i64 {
     let bits = |x: f64| (x.to_bits() >> 52 & 0x7ff) as i64;
     match bits(x) {
@@ -31,12 +31,13 @@ pub(crate) fn exponent(x: f64) -> i64 {
     }
 }
 
-/// The largest modulus among some numbers, zero if there are none.
+/// The largest modulus of several numbers; zero if there are none.
 pub(super) fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
     values.into_iter().fold(0.0, |most, x| x.abs().max(most))
 }
 
-/// max √|a_ij a_ji| of a square matrix of n rows, the diagonal included: a size that is the same in all units of the coordinates.
+/// max √|a_ij a_ji| of a square matrix of n rows, including the diagonal: a size that does not depend on the units of
+/// the coordinates.
 pub(crate) fn size_in_all_units(a: &[f64], n: usize) -> f64 {
     let root = |row: usize, column: usize| a[row + column * n].abs().sqrt();
     let pairs = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
@@ -67,7 +68,7 @@ impl Scaled {
         self.exponent += exponent + more;
     }
 
-    /// The mantissa for another exponent.
+    /// The mantissa that belongs to another exponent.
     pub(super) fn mantissa_for(&self, exponent: i64) -> Complex<f64> {
         let shift = self.exponent - exponent;
         Complex::new(
@@ -76,7 +77,7 @@ impl Scaled {
         )
     }
 
-    /// The natural logarithm of the modulus, as accurate for a modulus near one as the modulus itself.
+    /// The natural logarithm of the modulus; for a modulus close to one it is as accurate as the modulus.
     pub(super) fn ln_modulus(&self) -> f64 {
         let z = self.mantissa;
         let modulus = if z.im == 0.0 {
@@ -87,7 +88,7 @@ impl Scaled {
         if modulus == 0.0 {
             return f64::NEG_INFINITY;
         }
-        // Between √½ and √2, so that nothing cancels between the two terms.
+        // The mantissa is between √½ and √2, so that the two terms do not cancel.
         let mut shift = exponent(modulus);
         let mut mantissa = times_power_of_two(modulus, -shift);
         if mantissa > 2.0 * FRAC_1_SQRT_2 {
@@ -98,7 +99,7 @@ impl Scaled {
     }
 }
 
-/// A number as m · 2^e, where e = 0 unless the number is large or small enough to endanger a product of two.
+/// A number as m · 2^e, with e = 0 unless a product of two such numbers could overflow or underflow.
 fn normalized(z: Complex<f64>) -> (Complex<f64>, i64) {
     let size = z.re.abs().max(z.im.abs());
     if size == 0.0 || (1e-90..1e90).contains(&size) {
@@ -111,7 +112,7 @@ fn normalized(z: Complex<f64>) -> (Complex<f64>, i64) {
     )
 }
 
-/// The Euclidean norm, without overflow or underflow on the way.
+/// The Euclidean norm, without intermediate overflow or underflow.
 fn norm(x: &[f64]) -> f64 {
     let squares: f64 = x.iter().map(|x| x * x).sum();
     if (1e-250..1e250).contains(&squares) {

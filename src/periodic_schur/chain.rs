@@ -8,31 +8,32 @@ use super::error::PeriodicSchurError;
 use nalgebra::{Complex, DMatrix};
 use std::ops::Range;
 
-/// One matrix a factor or node.
+/// One matrix for each factor or node.
 type Matrices = Vec<DMatrix<f64>>;
 
-/// What the transformations must carry along.
+/// What the transformations are applied to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Wanted {
-    /// The eigenvalues only: balanced factors, no bases, each block transformed for itself.
+    /// Eigenvalues only: factors are balanced, there are no bases, and each block is transformed separately.
     Multipliers,
     /// The bases and the whole triangular factors.
     SchurForm,
 }
 
-/// The factors T_k = Q_{k+1}ᵀ A_k Q_k on their way to triangular form; node k is the space between T_{k−1} and T_k.
+/// The factors T_k = Q_{k+1}ᵀ A_k Q_k during the reduction to triangular form; node k is the space between T_{k−1} and
+/// T_k.
 pub(super) struct Chain {
     order: usize,
     /// At least one, each order × order and finite.
     factors: Matrices,
-    /// Factor k stands for `factors[k]` · 2^`exponents[k]`.
+    /// Factor k is `factors[k]` · 2^`exponents[k]`.
     exponents: Vec<i64>,
-    /// Q_k, one a node, if wanted.
+    /// Q_k for each node, if wanted.
     bases: Option<Matrices>,
 }
 
 impl Chain {
-    /// Checks the factors.
+    /// Checks and scales the factors.
     pub(super) fn new(mut factors: Matrices, wanted: Wanted) -> Result<Self, PeriodicSchurError> {
         let order = factors.first().ok_or(PeriodicSchurError::Empty)?.nrows();
         for (index, factor) in factors.iter().enumerate() {
@@ -110,7 +111,7 @@ impl Chain {
         row + 1 >= self.order || self.at(self.last(), row + 1, row) == 0.0
     }
 
-    /// The exponents taken out of the factors, together.
+    /// The sum of the exponents taken out of the factors.
     pub(super) fn exponent(&self) -> i64 {
         self.exponents.iter().sum()
     }
@@ -125,7 +126,7 @@ impl Chain {
         product
     }
 
-    /// The rows and columns that a transformation of the block `first..=last` must reach.
+    /// The rows and columns to which a transformation of the block `first..=last` is applied.
     pub(super) fn reach(&self, first: usize, last: usize) -> Range<usize> {
         if self.bases.is_some() {
             0..self.order
@@ -155,7 +156,7 @@ impl Chain {
         }
     }
 
-    /// Reflects columns of a factor, from `column` on, and with them the basis they belong to.
+    /// Reflects columns of a factor, from `column` on, and the basis of their node.
     pub(super) fn reflect_columns(
         &mut self,
         factor: usize,
@@ -202,7 +203,7 @@ impl Chain {
         );
     }
 
-    /// Rotates two columns of a factor, and with them the basis they belong to.
+    /// Rotates two columns of a factor, and the basis of their node.
     pub(super) fn rotate_columns(
         &mut self,
         factor: usize,
@@ -226,10 +227,11 @@ impl Chain {
         }
     }
 
-    /// Makes the last factor Hessenberg and the others triangular.
+    /// Reduces the last factor to Hessenberg form and the others to triangular form.
     ///
-    /// Column j is cleared in all factors, in the order they act, before column j + 1: the reflection that clears it
-    /// in one factor acts on columns j and on of the next, and the one of the last factor leaves column j alone.
+    /// Column j is cleared in all factors, in the order of multiplication, before column j + 1. The reflection that
+    /// clears it in one factor also acts on the columns from j on of the next factor; the one of the last factor does
+    /// not affect column j.
     pub(super) fn reduce(&mut self) {
         let n = self.order;
         let last = self.last();
@@ -251,9 +253,9 @@ impl Chain {
     }
 }
 
-/// Scales a factor by 2^−e where its largest entry could over- or underflow in sums; returns e.
+/// Scales a factor by 2^−e if its largest entry could overflow or underflow in sums; returns e.
 ///
-/// Nothing else is scaled: in a factor with entries of very different size the small ones would be lost.
+/// No other scaling is applied: in a factor with entries of very different size the small ones would be lost.
 fn keep_from_overflow(factor: &mut DMatrix<f64>) -> i64 {
     let size = largest(factor.iter());
     let shift = match exponent(size) {
@@ -270,8 +272,8 @@ fn keep_from_overflow(factor: &mut DMatrix<f64>) -> i64 {
 
 /// Scales rows and columns of all factors by one diagonal similarity A_k → D⁻¹ A_k D of powers of two.
 ///
-/// The coordinates of a mechanical system and their momenta have units that may make one a billion times the other;
-/// balancing (Parlett and Reinsch) takes the difference out of the factors and with it out of the round-off.
+/// The units of coordinates and momenta may make one a billion times the other; balancing (Parlett and Reinsch) removes
+/// this ratio from the factors and from the rounding errors.
 fn balance(factors: &mut [DMatrix<f64>], n: usize) {
     let is_lost = |factor: &DMatrix<f64>| {
         let size = largest(factor.iter());
@@ -279,14 +281,14 @@ fn balance(factors: &mut [DMatrix<f64>], n: usize) {
         entries.any(|x| *x != 0.0 && x.abs() / size < f64::MIN_POSITIVE)
     };
     if factors.iter().any(is_lost) {
-        // First as they are, so that none is taken for zero.
+        // First unscaled, so that no entry counts as zero.
         balance_by(factors, n, |_| 1.0);
     }
-    // Then each factor relative to its largest entry.
+    // Then with each factor relative to its largest entry.
     balance_by(factors, n, |factor| largest(factor.iter()));
 }
 
-/// The same by the largest modulus at each place, relative to the sizes of the factors.
+/// Balances by the largest modulus of each entry, relative to the sizes of the factors.
 fn balance_by(factors: &mut [DMatrix<f64>], n: usize, size_of: impl Fn(&DMatrix<f64>) -> f64) {
     let mut most = DMatrix::<f64>::zeros(n, n);
     for factor in factors.iter() {
@@ -310,15 +312,15 @@ fn balance_by(factors: &mut [DMatrix<f64>], n: usize, size_of: impl Fn(&DMatrix<
 
 /// Finds exponents s for which 2^−s_i · `most`_ij · 2^s_j is balanced, and applies this similarity to `most`.
 ///
-/// `most` holds moduli, n × n by columns; for one by rows the exponents come with the opposite sign. Balanced are the
-/// sums of each row and of the column of the same number, without the diagonal and with `floor` added: entries that are
-/// small beside a positive `floor` are left as they are. Without one, a row or a column that has no counterpart, as those of free
-/// coordinates and of conserved momenta, is made no larger than [`size_in_all_units`].
+/// `most` contains moduli, n × n, column-major; for a row-major matrix the exponents have the opposite sign. The sums
+/// of each row and of the column of the same index are balanced, without the diagonal and with `floor` added, so that
+/// entries small relative to `floor` are left alone. Without a floor, a row or a column without a counterpart, as that
+/// of a free coordinate or a conserved momentum, is made no larger than [`size_in_all_units`].
 pub(crate) fn balancing(most: &mut [f64], floor: f64, exponents: &mut [i64]) {
     let n = exponents.len();
     let size = size_in_all_units(most, n);
     exponents.fill(0);
-    // Each pass at least halves what is left to do; a dozen reach every scale of an f64.
+    // Each pass at least halves the remaining exponents; a dozen passes cover the range of `f64`.
     for _ in 0..24 {
         let mut changed = false;
         for i in 0..n {

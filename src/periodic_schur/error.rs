@@ -1,4 +1,4 @@
-//! Why there are no eigenvalues of a product.
+//! The errors of the periodic Schur decomposition.
 
 use std::error::Error;
 use std::fmt;

@@ -9,13 +9,15 @@ type C = Complex<f64>;
 
 const ZERO: C = C::new(0.0, 0.0);
 
-/// QR steps before giving up; two are usual.
+/// The largest number of QR steps; two are usual.
 const STEPS: u32 = 60;
 
-/// The two eigenvalues of the block that starts with this row: conjugates, positive argument first, or both real.
+/// The two eigenvalues of the 2 × 2 block that starts at this row: conjugate with the positive argument first, or both
+/// real.
 ///
-/// The trace of the product would lose the argument wherever the product is much larger than its eigenvalues. So the
-/// block is made triangular by unitary rotations, in all factors, as the whole chain was by real ones.
+/// Computed from the trace of the product they would lose their arguments if the product is much larger than its
+/// eigenvalues. Therefore unitary rotations make the block triangular in all factors, as the orthogonal transformations
+/// do for the whole chain.
 pub(super) fn eigenvalues(chain: &Chain, row: usize) -> Result<[Scaled; 2], PeriodicSchurError> {
     let mut blocks: Vec<[[C; 2]; 2]> = (0..=chain.last())
         .map(|factor| {
@@ -50,7 +52,7 @@ pub(super) fn eigenvalues(chain: &Chain, row: usize) -> Result<[Scaled; 2], Peri
     Ok(conjugates_or_reals(products))
 }
 
-/// The two eigenvalues of a real matrix, freed of the round-off that makes them neither conjugates nor real.
+/// The two eigenvalues of a real matrix, corrected for rounding errors to be exactly conjugate or real.
 fn conjugates_or_reals(products: [Scaled; 2]) -> [Scaled; 2] {
     let common = products
         .iter()
@@ -75,7 +77,7 @@ fn conjugates_or_reals(products: [Scaled; 2]) -> [Scaled; 2] {
     })
 }
 
-/// One QR step, with the eigenvalue of the product next to its last entry as shift.
+/// One QR step; the shift is the eigenvalue of the product closest to its last entry.
 fn step(last: &mut [[C; 2]; 2], triangular: &mut [[[C; 2]; 2]]) {
     let [[a, b], [c, d]] = product(last, triangular);
     let half = (a - d) * 0.5;
@@ -104,7 +106,7 @@ fn step(last: &mut [[C; 2]; 2], triangular: &mut [[[C; 2]; 2]]) {
 
 /// A multiple of the product.
 fn product(last: &[[C; 2]; 2], triangular: &[[[C; 2]; 2]]) -> [[C; 2]; 2] {
-    // The two columns of the product of the triangular blocks, each with its exponent.
+    // The columns of the product of the triangular blocks, each with an exponent.
     let mut columns = [
         ([C::new(1.0, 0.0), ZERO], 0i64),
         ([ZERO, C::new(1.0, 0.0)], 0),
@@ -136,7 +138,7 @@ fn product(last: &[[C; 2]; 2], triangular: &[[[C; 2]; 2]]) -> [[C; 2]; 2] {
     [[a, b], [c, d]]
 }
 
-/// The larger modulus of the two parts: within √2 of the modulus, and safe from overflow.
+/// The larger modulus of real and imaginary part: within √2 of the modulus, and safe from overflow.
 fn size(z: C) -> f64 {
     z.re.abs().max(z.im.abs())
 }
@@ -149,7 +151,7 @@ struct Unitary {
 }
 
 impl Unitary {
-    /// The matrix whose adjoint takes (x, y) to (r, 0), and r.
+    /// The matrix whose adjoint maps (x, y) to (r, 0), and r.
     fn new(x: C, y: C) -> (Self, C) {
         let most = size(x).max(size(y));
         if y == ZERO || most == 0.0 {

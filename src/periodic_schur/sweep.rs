@@ -4,33 +4,33 @@ use super::arithmetic::{Rotation, exponent, largest, reflection, times_power_of_
 use super::chain::Chain;
 use super::error::PeriodicSchurError;
 
-/// QR steps on one block before giving up; two or three are usual.
+/// The largest number of QR steps on one block; two or three are usual.
 const STEPS: u32 = 90;
 
-/// QR steps without result after which a step is taken out of the ordinary.
+/// The number of QR steps without result after which an exceptional step is made.
 const PATIENCE: u32 = 10;
 
-/// Steps without shift in search of a zero eigenvalue that the last factor may hide.
+/// The number of steps without shift that look for a zero eigenvalue hidden in the last factor.
 const DOUBTS: u32 = 4;
 
-/// What a step without shift says of the last factor.
+/// What a step without shift has shown about the last factor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Rank {
     Full,
-    /// Close to a singular matrix: the zero may yet have to travel to the last row.
+    /// Nearly singular: the zero may not have reached the last row yet.
     Doubtful,
-    /// Singular to round-off; the last eigenvalue is zero and split off.
+    /// Singular up to rounding error; the last eigenvalue is zero and split off.
     Deficient,
 }
 
-/// A block of rows `first..=last` that no vanishing subdiagonal entry divides.
+/// A block of rows `first..=last` without negligible subdiagonal entries.
 #[derive(Clone, Copy, Debug)]
 struct Block {
     first: usize,
     last: usize,
 }
 
-/// A few entries of one column of the product, times 2^exponent.
+/// Some entries of one column of the product, times 2^exponent.
 struct Column {
     entries: [f64; 3],
     exponent: i64,
@@ -41,7 +41,7 @@ impl Chain {
     pub(super) fn iterate(&mut self) -> Result<(), PeriodicSchurError> {
         let mut remaining = self.order();
         let mut iterations = 0;
-        // From this row on, the last factor is known to be regular.
+        // From this row on, the last factor is known to be nonsingular.
         let mut regular_from = remaining;
         while remaining > 0 {
             let last = remaining - 1;
@@ -50,7 +50,7 @@ impl Chain {
                 last,
             };
             let size = last - block.first + 1;
-            // A zero eigenvalue must be out before shifts make sense.
+            // Zero eigenvalues must be split off before shifts are useful.
             let singular = size > 1 && (self.clear_zero_diagonal(block) || last < regular_from);
             if size == 1 || (size == 2 && !singular && self.is_complex(block)) {
                 remaining -= size;
@@ -67,7 +67,7 @@ impl Chain {
             iterations += 1;
             if singular || iterations % (2 * PATIENCE) == PATIENCE {
                 regular_from = match self.step_without_shift(block) {
-                    // There may be another above.
+                    // There may be another zero above.
                     Rank::Deficient => last,
                     Rank::Doubtful if iterations < DOUBTS => last + 1,
                     _ => block.first,
@@ -89,7 +89,8 @@ impl Chain {
             let mut size =
                 self.at(hessenberg, row - 1, row - 1).abs() + self.at(hessenberg, row, row).abs();
             if size == 0.0 || iterations > PATIENCE {
-                // Relative to its neighbours the entry may have met its own round-off, which goes with the norm.
+                // Relative to its neighbours the entry may not fall below its rounding error, which is relative to the
+                // norm.
                 size = (0..=last).fold(size, |most, j| {
                     (0..=(j + 1).min(last))
                         .fold(most, |most, i| most.max(self.at(hessenberg, i, j).abs()))
@@ -103,9 +104,9 @@ impl Chain {
         0
     }
 
-    /// What is round-off of zero, in parts of the entries above it.
+    /// The rounding error of zero, relative to the entries above it.
     fn zero_tolerance(&self) -> f64 {
-        // The reduction passes each column through some 2 n reflections.
+        // The reduction applies about 2 n reflections to each column.
         2.0 * (self.order() + 2) as f64 * f64::EPSILON
     }
 
@@ -116,7 +117,8 @@ impl Chain {
             .sum()
     }
 
-    /// Sets diagonal entries of the triangular factors to zero that are zero to round-off; whether there are any.
+    /// Sets diagonal entries of the triangular factors to zero if they are zero up to rounding error; returns whether
+    /// there are any.
     fn clear_zero_diagonal(&mut self, block: Block) -> bool {
         let tolerance = self.zero_tolerance();
         let mut any = false;
@@ -133,11 +135,11 @@ impl Chain {
         any
     }
 
-    /// A step without shift.
+    /// One QR step without shift.
     ///
-    /// The last factor is made triangular by rotations, which are then taken through the others. A zero on the
-    /// diagonal of one of these, in row j, stops the rotation of rows j − 1 and j: the block divides above j, and the
-    /// zero has gone to the end of its part, where a second step splits it off.
+    /// Rotations make the last factor triangular and are then passed through the others. A zero on the diagonal of one
+    /// of these, in row j, absorbs the rotation of rows j − 1 and j: the block splits above j, and the zero has moved
+    /// to the end of its part, where a second step splits it off.
     fn step_without_shift(&mut self, block: Block) -> Rank {
         let Block { first, last } = block;
         let hessenberg = self.last();
@@ -167,7 +169,7 @@ impl Chain {
         rank
     }
 
-    /// A step with one real shift on a 2 × 2 block.
+    /// One QR step with a real shift on a 2 × 2 block.
     fn step_with_one_shift(&mut self, block: Block) {
         let [[a, b], [c, d]] = self.product_of_two(block.first);
         let shift = near_eigenvalue(a, b, c, d).unwrap_or(d);
@@ -177,7 +179,7 @@ impl Chain {
         self.take_round(block, vec![rotation]);
     }
 
-    /// Takes rotations of the rows of the last factor through the triangular ones and to its columns.
+    /// Passes rotations of the rows of the last factor through the triangular factors to its columns.
     fn take_round(&mut self, block: Block, mut rotations: Vec<Rotation>) {
         let reach = self.reach(block.first, block.last);
         for factor in 0..self.last() {
@@ -195,13 +197,14 @@ impl Chain {
         }
     }
 
-    /// A step with two shifts, real or conjugate, on a block of at least three rows.
+    /// One QR step with two shifts, real or conjugate, on a block of at least three rows.
     fn step_with_two_shifts(&mut self, block: Block, out_of_the_ordinary: bool) {
         let Block { first, last } = block;
         let hessenberg = self.last();
         let reach = self.reach(first, last);
         let mut start = self.shifted_column(block, out_of_the_ordinary);
-        // The reflection of rows j, … of the last factor goes once round and makes a bulge one column further on.
+        // The reflection of rows j, … of the last factor passes once through all factors and creates a bulge one column
+        // further on.
         for j in first..last {
             let size = (last - j + 1).min(3);
             let v = &mut start[..size];
@@ -236,7 +239,7 @@ impl Chain {
         }
     }
 
-    /// Writes the image of a reflected vector: β and zeros.
+    /// Writes the image of a reflected vector: β, then zeros.
     fn finish_column(&mut self, factor: usize, row: usize, column: usize, beta: f64, size: usize) {
         self.set(factor, row, column, beta);
         for i in 1..size {
@@ -244,7 +247,7 @@ impl Chain {
         }
     }
 
-    /// The end of the rows that are filled in the columns before `column`, in the block that ends with `last`.
+    /// The end of the nonzero rows in the columns before `column`, in the block that ends with `last`.
     fn filled(&self, factor: usize, column: usize, last: usize) -> usize {
         if factor == self.last() {
             (column + 1).min(last + 1)
@@ -253,9 +256,10 @@ impl Chain {
         }
     }
 
-    /// A multiple of (P − σ₁)(P − σ₂) e₁, for the shifts σ that the end of the block suggests.
+    /// A multiple of (P − σ₁)(P − σ₂) e₁, where the shifts σ are estimated at the end of the block.
     ///
-    /// Round-off in it slows the iteration at worst: whatever the vector, the step is an orthogonal transformation.
+    /// Rounding errors in it can only slow down the iteration: for any vector, the step is an orthogonal
+    /// transformation.
     fn shifted_column(&self, block: Block, out_of_the_ordinary: bool) -> [f64; 3] {
         let Block { first, last } = block;
         let mut columns = [
@@ -277,10 +281,10 @@ impl Chain {
                 Err(discriminant) => (f64::midpoint(a, d), -discriminant),
             }
         };
-        // In differences, which are exact where P is close to a multiple of the identity.
+        // Written with differences, which are exact if P is close to a multiple of the identity.
         let (x, y) = (p11 - center, p22 - center);
         let v = [x * x + square + p12 * p21, p21 * (x + y), p21 * p32];
-        // All may have underflowed; any other start is a start.
+        // All entries may have underflowed; then any start vector serves.
         if largest(&v) > 0.0 { v } else { [1.0; 3] }
     }
 
@@ -290,7 +294,7 @@ impl Chain {
         near_eigenvalue(a, b, c, d).is_err()
     }
 
-    /// A multiple of the 2 × 2 block of the product that starts at this row, itself a whole block.
+    /// A multiple of the 2 × 2 block of the product that starts at this row and is a block by itself.
     fn product_of_two(&self, first: usize) -> [[f64; 2]; 2] {
         let mut columns = [0, 1].map(|column| self.column_of_product(first, 2, column, [0, 1, 1]));
         to_one_exponent(&mut columns);
@@ -298,9 +302,9 @@ impl Chain {
         [[a, b], [c, d]]
     }
 
-    /// Entries of one column of the product, where only `size` rows and columns from `first` on count in the factors.
+    /// Entries of one column of the product, using only `size` rows and columns of the factors from `first` on.
     ///
-    /// `column` and `rows` count from `first`; rows beyond the last of the matrix are zero.
+    /// `column` and `rows` are counted from `first`; rows beyond the end of the matrix are zero.
     fn column_of_product(
         &self,
         first: usize,
@@ -339,7 +343,7 @@ impl Chain {
     }
 }
 
-/// Brings columns to one exponent, the largest that is needed: what is too small for it becomes zero.
+/// Scales columns to a common exponent, the largest; entries too small for it become zero.
 fn to_one_exponent(columns: &mut [Column]) {
     let size = |column: &Column| {
         let most = largest(&column.entries);
@@ -354,9 +358,9 @@ fn to_one_exponent(columns: &mut [Column]) {
     }
 }
 
-/// The eigenvalue of (a b; c d) next to d if it is real, otherwise the negative square of its imaginary part.
+/// The eigenvalue of (a b; c d) closest to d if it is real, otherwise the negative square of its imaginary part.
 ///
-/// Entries are at most 2 in modulus.
+/// The moduli of the entries are at most 2.
 fn near_eigenvalue(a: f64, b: f64, c: f64, d: f64) -> Result<f64, f64> {
     let half = 0.5 * (a - d);
     let discriminant = half * half + b * c;

@@ -1,4 +1,4 @@
-//! What the tests share: random chains of known spectrum, and checks of a decomposition.
+//! Helpers of the tests: random chains with known spectrum, and checks of a decomposition.
 
 use super::*;
 use std::f64::consts::TAU;
@@ -54,7 +54,7 @@ enum Part {
     Pair(f64, f64),
 }
 
-/// Factors X_{k+1} D_k X_k⁻¹ whose product has the given eigenvalues; D_k the m-th root of each, up to a sign.
+/// Factors X_{k+1} D_k X_k⁻¹ whose product has the given eigenvalues; D_k contains the m-th root of each, up to sign.
 fn chain_of(parts: &[Part], m: usize, random: &mut Random) -> Vec<DMatrix<f64>> {
     let n = parts
         .iter()
@@ -99,7 +99,7 @@ fn chain_of(parts: &[Part], m: usize, random: &mut Random) -> Vec<DMatrix<f64>> 
         .collect()
 }
 
-/// The largest relative distance of computed multipliers from the parts, which are listed by decreasing modulus.
+/// The largest relative distance of the computed multipliers from the parts, which are sorted by decreasing modulus.
 #[track_caller]
 fn distance(found: &[Multiplier], parts: &[Part]) -> f64 {
     let expected: Vec<(f64, f64)> = parts
@@ -121,13 +121,13 @@ fn distance(found: &[Multiplier], parts: &[Part]) -> f64 {
         })
 }
 
-/// The bound for well-conditioned chains: m factors, each with an error of some n ε, amplified by condition numbers of
-/// some ten each, of the factor and of the eigenvectors.
+/// The error bound for well-conditioned chains: m factors with an error of a few n ε each, amplified by the condition
+/// numbers of the factor and of the eigenvectors, each about ten.
 fn bound(m: usize, n: usize) -> f64 {
     100.0 * (m * n) as f64 * f64::EPSILON
 }
 
-/// Checks the list: decreasing moduli, pairs adjacent and conjugate, arguments in range.
+/// Checks the order: decreasing moduli, pairs adjacent and conjugate, arguments in range.
 #[track_caller]
 fn check_order(found: &[Multiplier]) {
     assert!(
@@ -161,7 +161,7 @@ fn check_schur(factors: &[DMatrix<f64>]) {
     let (n, m) = (factors[0].nrows(), factors.len());
     let schur = PeriodicSchur::new(factors).expect("converges");
     let (q, t) = (schur.orthogonal(), schur.triangular());
-    // Some ten QR steps an eigenvalue, n reflections each.
+    // About ten QR steps for each eigenvalue, with n reflections each.
     let tolerance = 10.0 * (n * n).max(10) as f64 * f64::EPSILON;
     for k in 0..m {
         assert!((q[k].transpose() * &q[k] - DMatrix::identity(n, n)).norm() < tolerance);

@@ -1,4 +1,4 @@
-//! A chain that is solved.
+//! The solution of the equations of an orbit.
 
 use super::shooting::Shooting;
 use crate::length::RunTimeLength;
@@ -50,7 +50,7 @@ impl<M: family::Model> Chained<0, RunTimeLength> for Shooting<'_, M> {
         let (start, first) = (self.start, &self.nodes[0]);
         let mut motion = Motion::from_start(self.model, start, first);
         motion.set_statistics(self.statistics);
-        // Each element begins where the one before ends, to the last bit.
+        // Each element begins exactly where the previous one ends.
         let mut places = Vec::with_capacity(self.mesh.elements());
         let mut t = self.start;
         for e in 0..self.mesh.elements() {
@@ -68,7 +68,7 @@ impl<M: family::Model> Chained<0, RunTimeLength> for Shooting<'_, M> {
             motion.record(self.model, end, node);
             motion.keep_element(dense);
         };
-        // These steps have been done before: they cannot fail now, and a motion that ends early would show it.
+        // The same steps succeeded before; if one failed now, the motion would visibly end early.
         let _ = family::TransitionOperator::of_steps(
             self.model,
             self.element,

@@ -1,4 +1,4 @@
-//! Orbits of models of run-time length with their derivatives by parameters.
+//! Periodic orbits of models of run-time length with their derivatives by parameters.
 
 use super::super::error::OrbitError;
 use super::super::moving;
@@ -53,7 +53,7 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
     }
 }
 
-/// How a solution changes with a parameter.
+/// The derivative of a solution by a quantity.
 struct Change {
     nodes: Vec<FamilyState>,
     period: f64,
@@ -61,7 +61,7 @@ struct Change {
 }
 
 impl<'m, M: family::Model> Shooting<'m, M> {
-    /// By all parameters, and by the period where it is given.
+    /// The derivatives by all parameters, and by the period if it is given.
     fn changes(&self) -> Result<Vec<Change>, OrbitError> {
         let (model, n) = (self.model, self.model.len());
         let elements = self.mesh.elements();
@@ -128,7 +128,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         Ok((0..sides).map(change).collect())
     }
 
-    /// What a unit of the period does to the ends of the elements, from their nodes: differences of eighth order.
+    /// The derivatives of the ends of the elements by the period, at fixed start nodes: differences of eighth order.
     fn ends_by_period(&self) -> Result<Vec<f64>, OrbitError> {
         let size = 2 * self.model.len();
         let mut sums = vec![0.0; size * self.mesh.elements()];
@@ -164,7 +164,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         done.map_err(|failed| step_failed(failed, places))
     }
 
-    /// ∂H/∂a at fixed coordinates and momenta, which is −∂L/∂a at fixed velocities.
+    /// ∂H/∂a at fixed coordinates and momenta; equal to −∂L/∂a at fixed velocities.
     fn energy_by(&self, parameter: usize) -> Result<f64, OrbitError> {
         let (t, first) = (self.start, &self.nodes[0]);
         let velocity = family::velocity(self.model, t, first)
@@ -182,7 +182,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         Ok(sign * energy.slope)
     }
 
-    /// How the multipliers move with a parameter, or with the period.
+    /// The derivatives of the multipliers by a parameter, or by the period.
     fn moving(
         &self,
         orbit: &Orbit<'m, M, 0, RunTimeLength>,

@@ -1,4 +1,4 @@
-//! Multiple shooting: the nodes of all elements as unknowns, each element solved by itself.
+//! Multiple shooting: the unknowns are the nodes of all elements, and each element is solved separately.
 
 use super::super::error::OrbitError;
 use super::super::kind::Chained;
@@ -21,20 +21,20 @@ pub struct Shooting<'m, M> {
     pub(super) start: f64,
     pub(super) period: f64,
     pub(super) unfolding: f64,
-    /// As that of orbits of fixed size.
+    /// The inertia by which the unfolding force is scaled, as for models of fixed size.
     inertia: f64,
     pub(super) globals: Vec<Global>,
     pub(super) phase: Option<Phase>,
     pub(super) energy: Option<f64>,
     pub(super) nodes: Vec<FamilyState>,
     pub(super) transitions: Vec<DMatrix<f64>>,
-    /// The flow ẏ at the ends of elements, ordered (p, q), where these are so few that their nodes do not tell it.
+    /// The flow ẏ at the ends of the elements, in the order (p, q), if there are too few nodes for differences.
     flows: Vec<Vec<f64>>,
     pub(super) statistics: Statistics,
 }
 
 impl<'m, M: family::Model> Shooting<'m, M> {
-    /// A forced orbit through the nodes of a guess.
+    /// An orbit with a known period, from the nodes of a guess.
     pub(super) fn new(
         model: &'m M,
         element: Element,
@@ -60,7 +60,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         }
     }
 
-    /// Whether the guess does not move: an equilibrium, whose multipliers are asked for.
+    /// Whether the guess is constant: an equilibrium whose multipliers are asked for.
     pub(super) fn is_at_rest(&self) -> bool {
         let first = &self.nodes[0];
         let velocity = family::velocity(self.model, self.start, first);
@@ -68,14 +68,15 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             && self.nodes.iter().all(|node| node == first)
     }
 
-    /// The energy at the start; none where no velocity belongs to it.
+    /// The energy at the start; `None` if no velocity belongs to the momentum.
     pub(super) fn energy_of_start(&self) -> Option<f64> {
         let (t, first) = (self.start, &self.nodes[0]);
         let velocity = family::velocity(self.model, t, first).ok()?;
         Some(family::energy(self.model, t, first, &velocity))
     }
 
-    /// The multipliers of the matrices of elements from such nodes, the largest first; with constraints, those of the motions that these allow.
+    /// The multipliers of the transition matrices, the largest first. With constraints, those of the motions that the
+    /// constraints allow at the nodes.
     pub(super) fn floquet_of(
         &self,
         transitions: &[DMatrix<f64>],
@@ -98,25 +99,25 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         Ok(floquet)
     }
 
-    /// How many multipliers are one.
+    /// The number of trivial multipliers.
     pub(super) fn trivial(&self) -> usize {
         let unfolded = self.globals.contains(&Global::Unfolding);
         usize::from(self.phase.is_some()) * (1 + usize::from(unfolded))
     }
 
-    /// γ of the unfolding force, if there is one.
+    /// The coefficient γ of the unfolding force, if there is one.
     pub(super) fn unfolding(&self) -> Option<f64> {
         let unfolded = self.globals.contains(&Global::Unfolding);
         unfolded.then_some(self.unfolding)
     }
 
-    /// Iterates to a solution, by steps that are halved where they lead away.
+    /// Newton's method with step halving.
     pub(super) fn solve(&mut self, control: Control) -> Result<(), OrbitError> {
         let n = self.model.len();
         if self.globals.contains(&Global::Unfolding) {
             let (mut momenta, mut velocities) = (Vec::new(), Vec::new());
             for node in &self.nodes {
-                // Where there is none the first step says so.
+                // If there is none, the first linearisation reports it.
                 if let Ok(v) = family::velocity(self.model, self.start, node) {
                     momenta.extend_from_slice(&node.p);
                     velocities.extend(v);
@@ -152,12 +153,12 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         }
     }
 
-    /// Whether time forces orbits.
+    /// Whether the model depends on time.
     fn is_forced() -> bool {
         M::FACTS.time_dependent || M::MOMENTA_MOVE
     }
 
-    /// Why there is no orbit: a forced one at resonance is told.
+    /// The error of a failed iteration; for a forced orbit it may be resonance.
     fn explained(&self, error: AssemblyError, chain: &Chain) -> OrbitError {
         match Self::is_forced() {
             true => chain.explained(error).into(),
@@ -165,7 +166,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         }
     }
 
-    /// Refuses a forced orbit that elements of half the length do not leave as it is, as for orbits of fixed size.
+    /// Refuses a forced orbit that elements of half the length do not confirm, as for models of fixed size.
     fn check_resolved(&self, chain: &Chain) -> Result<(), OrbitError> {
         if !(Self::is_forced() && chain.is_doubtful()) {
             return Ok(());
@@ -184,7 +185,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         let is_left = match halves.linearise(&mut other) {
             Ok(()) => halves.size(&other).leaves(),
             Err(OrbitError::Assembly(AssemblyError::Singular { .. })) => false,
-            // What it cannot tell it does not refuse.
+            // If the check itself fails, the orbit is accepted.
             Err(_) => true,
         };
         if is_left {
@@ -194,12 +195,13 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         Err(AssemblyError::Singular { iterations }.into())
     }
 
-    /// Whether a solution is an orbit.
+    /// Checks that a solution is an orbit.
     fn check(&self) -> Result<(), OrbitError> {
         check(self.period, self.unfolding, self.inertia)
     }
 
-    /// Steps all elements from their nodes and solves for the correction, which is then in the chain.
+    /// Solves all elements from their nodes, linearises them, and solves for the correction, which is then in the
+    /// chain.
     fn linearise(&mut self, chain: &mut Chain) -> Result<(), OrbitError> {
         let mut transitions = Vec::with_capacity(self.mesh.elements());
         let mut flows = Vec::new();
@@ -247,7 +249,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         places.collect()
     }
 
-    /// Writes what an element makes of its start and of the globals into its link, and gives its matrix.
+    /// Writes the linearisation of an element into its link; returns its transition matrix.
     pub(super) fn link(
         &self,
         chain: &mut Chain,
@@ -278,7 +280,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         u32::try_from(self.statistics.newton_iterations).unwrap_or(u32::MAX)
     }
 
-    /// Periodicity, phase and energy.
+    /// Writes the conditions of periodicity, phase and energy.
     pub(super) fn close(&self, chain: &mut Chain) -> Result<(), OrbitError> {
         let n = self.model.len();
         let size = 2 * n;
@@ -310,9 +312,9 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             let dense = chain.dense_mut(0);
             let last = self.nodes.len() - 1;
             for e in 0..last {
-                // The flow is the difference of the neighbours; a condition of phase need not be exact.
+                // The flow by the difference of the neighbours; a phase condition need not be exact.
                 let previous = &self.nodes[if e == 0 { last - 1 } else { e - 1 }];
-                // That of the first node is found a period later.
+                // The previous neighbour of the first node is one period later.
                 let own = self.flows.get(if e == 0 { last - 1 } else { e - 1 });
                 for k in 0..size {
                     dense.nodes[e * size + k] = match own {
@@ -328,7 +330,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         Ok(())
     }
 
-    /// (H_p, H_q) and H.
+    /// The gradient (H_p, H_q) and H.
     fn energy_slopes(&self, state: &FamilyState) -> Result<(Vec<f64>, f64), OrbitError> {
         let (n, t) = (self.model.len(), self.start);
         let velocity = family::velocity(self.model, t, state)
@@ -350,7 +352,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         Ok((slopes, energy))
     }
 
-    /// The correction beside the iterate, as for orbits of fixed size.
+    /// The size of the correction relative to the iterate, as for models of fixed size.
     fn size(&self, chain: &Chain) -> Size {
         let nodes = self.nodes.iter().enumerate();
         let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)));
@@ -360,7 +362,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         sizes(nodes, chain.matrices(), globals)
     }
 
-    /// Adds a fraction of the correction.
+    /// Adds a fraction of the correction to the iterate.
     fn correct(&mut self, chain: &Chain, fraction: f64) {
         let n = self.model.len();
         for (e, node) in self.nodes.iter_mut().enumerate() {
@@ -379,7 +381,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
     }
 }
 
-/// Why an element of an orbit was not stepped.
+/// The error of an element that failed.
 pub(super) fn step_failed(
     (element, error): (usize, family::OperatorError),
     places: &[(f64, f64)],
@@ -395,7 +397,7 @@ pub(super) fn step_failed(
     }
 }
 
-/// A number of a state, in the order (p, q).
+/// A component of a state, in the order (p, q).
 pub(super) fn component(state: &FamilyState, k: usize) -> f64 {
     let n = state.p.len();
     if k < n { state.p[k] } else { state.q[k - n] }

@@ -1,4 +1,4 @@
-//! Spectra that are known, by construction or from the explicit product.
+//! Spectra known by construction or from the explicit product.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn eigenvalues_of_very_different_size_keep_relative_accuracy() {
         Real(-1.0, 1.0),
         Pair(-30.0, 1.0),
     ];
-    // e^±1000 and beyond what an f64 holds.
+    // e^±1000, outside the range of `f64`.
     let huge = [Real(434.3, 1.0), Pair(100.0, 0.5), Real(-434.3, -1.0)];
     for seed in 0..5 {
         for (parts, m) in [(&four[..], 40), (&four, 1000), (&six, 60), (&huge, 1000)] {
@@ -47,7 +47,7 @@ fn pairs_and_signs_in_every_arrangement() {
     ];
     for (seed, parts) in lists.iter().enumerate() {
         for m in [1, 2, 3, 10, 200] {
-            // The closest eigenvalues are 1e-3 apart: a condition number, which the m-th roots share.
+            // The closest eigenvalues are 1e-3 apart, which gives a condition number; it is shared by the m-th roots.
             let factors = chain_of(parts, m, &mut Random(seed as u64));
             let found = multipliers(&factors).expect("converges");
             check_order(&found);
@@ -65,14 +65,14 @@ fn products_of_rotations_lie_on_the_unit_circle() {
         let factors: Vec<_> = (0..m).map(|_| random.orthogonal(n)).collect();
         let found = multipliers(&factors).expect("converges");
         check_order(&found);
-        // Orthogonal transformations of orthogonal factors: no condition number, and errors of random sign.
+        // Orthogonal transformations of orthogonal factors: the condition number is one, and errors have random signs.
         let tolerance = 100.0 * n as f64 * (m as f64).sqrt() * f64::EPSILON;
         let most = found
             .iter()
             .map(|x| x.log_modulus.abs())
             .fold(0.0, crate::numbers::larger);
         assert!(most < tolerance, "n = {n}, m = {m}: {most:e}");
-        // The determinant, which is the sign of the product.
+        // The determinant equals the sign of the product.
         let sign: f64 = factors
             .iter()
             .map(DMatrix::determinant)
@@ -85,7 +85,7 @@ fn products_of_rotations_lie_on_the_unit_circle() {
 
 #[test]
 fn rotations_by_known_angles_add_up() {
-    // Angles that together make a turn and 0.3; each sine and cosine is rounded once.
+    // The angles sum to one turn plus 0.3; each sine and cosine is rounded once.
     for m in [1, 7, 1000, 10_000] {
         let angle = (TAU + 0.3) / m as f64;
         let (s, c) = angle.sin_cos();
@@ -148,7 +148,7 @@ fn symplectic_products_have_reciprocal_multipliers() {
 
 #[test]
 fn the_double_multiplier_of_an_autonomous_orbit_is_known_to_the_root_of_round_off() {
-    // (1 1; 0 1) in rotating coordinates: an eigenvalue 1 in a Jordan block of two.
+    // (1 1; 0 1) in rotating coordinates: a double eigenvalue 1 in a Jordan block.
     let mut random = Random(3);
     let m = 100;
     let nodes: Vec<_> = (0..m).map(|_| random.well_conditioned(2)).collect();
@@ -174,7 +174,8 @@ fn the_double_multiplier_of_an_autonomous_orbit_is_known_to_the_root_of_round_of
     }
 }
 
-/// The largest distance in a pairing of two spectra, relative to the spectral radius; each takes its nearest in turn.
+/// The largest distance in a pairing of two spectra, relative to the spectral radius; each eigenvalue in turn takes the
+/// closest remaining one.
 fn spectral_distance(found: &[Multiplier], mut expected: Vec<Complex<f64>>) -> f64 {
     let radius = expected.iter().fold(0.0f64, |most, z| most.max(z.norm()));
     found.iter().fold(0.0, |most, x| {
@@ -207,12 +208,12 @@ fn short_products_agree_with_the_explicit_product() {
             &found,
             product.complex_eigenvalues().iter().copied().collect(),
         );
-        // Random eigenvalues may be close to a double one: the bound allows for a condition number of 1e4.
+        // Random eigenvalues may be nearly double: the bound allows for a condition number of 1e4.
         assert!(
             error < 1e4 * bound(m, n),
             "seed {seed}, n = {n}, m = {m}: {error:e}"
         );
-        // The determinant is not subject to it.
+        // The determinant is not affected by it.
         let determinant: f64 = factors
             .iter()
             .map(|factor| factor.determinant().abs().ln())
@@ -243,7 +244,8 @@ fn one_factor_has_its_plain_eigenvalues() {
 
 #[test]
 fn long_random_products_converge() {
-    // Lyapunov exponents of random matrices: moduli from e^+hundreds to e^-hundreds; the determinant is their sum.
+    // Lyapunov exponents of random matrices: moduli from e^+hundreds to e^-hundreds, whose sum is given by the
+    // determinant.
     let mut random = Random(29);
     for (n, m) in [(2, 10_000), (4, 1000), (6, 200), (20, 50), (50, 3)] {
         let factors: Vec<_> = (0..m).map(|_| random.matrix(n)).collect();
@@ -254,7 +256,7 @@ fn long_random_products_converge() {
             .map(|factor| factor.determinant().abs().ln())
             .sum();
         let sum: f64 = found.iter().map(|x| x.log_modulus).sum();
-        // Random factors have condition numbers of some n and now and then of 1e4.
+        // Random factors have condition numbers of about n, and rarely of 1e4.
         assert!((determinant - sum).abs() < 100.0 * bound(m, n));
     }
 }

@@ -1,4 +1,4 @@
-//! Factors at the limits: singular, nearly trivial, badly scaled, not a product at all.
+//! Factors at the limits: singular, nearly trivial, badly scaled, or a single one.
 
 use super::*;
 
@@ -73,7 +73,7 @@ fn badly_scaled_coordinates_are_balanced() {
             *factor = DMatrix::from_fn(4, 4, |i, j| factor[(i, j)] * units[i] / units[j]);
         }
         let error = distance(&multipliers(&factors).expect("converges"), &parts);
-        // A single factor holds the whole spread of the eigenvalues: its condition number.
+        // A single factor contains the whole range of the eigenvalues, which is its condition number.
         assert!(
             error < bound(m, 4) * 1e6f64.powf(1.0 / m as f64),
             "{error:e}"
@@ -105,7 +105,7 @@ fn free_coordinates_of_any_mass() {
             assert!((x.log_modulus - 5.0 * 0.9f64.ln()).abs() < 1e-12, "{x:?}");
             assert!((x.argument - argument).abs() < 1e-12, "{x:?}");
         }
-        // The two ones are in one Jordan block, known to the root of round-off.
+        // The double eigenvalue 1 belongs to a Jordan block and is known to √ε.
         for x in &found[..2] {
             let error = x.log_modulus.hypot(x.argument);
             assert!(error < 1e-6, "mass {mass}: {x:?}");
@@ -131,7 +131,7 @@ fn a_singular_factor_gives_the_eigenvalue_zero() {
                         .iter()
                         .filter(|x| x.log_modulus == f64::NEG_INFINITY)
                         .count();
-                    // Only the first zero must be exact; the others are semisimple, so they are round-off.
+                    // Only the first zero must be exact; the others are semisimple and vanish up to rounding error.
                     let floor = bound(m, n).ln()
                         + factors.iter().map(|factor| factor.norm().ln()).sum::<f64>();
                     let zeros = found
@@ -170,7 +170,7 @@ fn a_singular_factor_gives_the_eigenvalue_zero() {
 
 #[test]
 fn a_product_close_to_the_identity_separates() {
-    // (P − σ)² is 1e-17 here: a start vector with σ² − 2 σ p₁₁ + p₁₁² in it would be round-off.
+    // (P − σ)² is 1e-17 here: a start vector computed with σ² − 2 σ p₁₁ + p₁₁² would be rounding error.
     let mut random = Random(31);
     for _ in 0..100 {
         let factors: Vec<_> = (0..3)
