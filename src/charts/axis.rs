@@ -14,7 +14,7 @@ pub enum Scale {
 }
 
 impl Scale {
-    /// Whether a value has a place.
+    /// Whether a value can be shown on this scale.
     fn holds(self, value: f64) -> bool {
         value.is_finite() && (self == Self::Linear || value > 0.0)
     }
@@ -62,7 +62,7 @@ impl Axis {
         self
     }
 
-    /// The axis over its own range, or over the values that have a place on it, longer by the fraction `margin` at each end.
+    /// The axis over its own range, or over the values that it can show, extended by the fraction `margin` at each end.
     pub(super) fn extent(
         &self,
         values: impl Iterator<Item = f64>,
@@ -80,7 +80,7 @@ impl Axis {
         })
     }
 
-    /// Whether an axis that begins here without a range of its own can be.
+    /// Checks that an axis without a range of its own can begin at this value.
     pub(super) fn check_start(&self, start: f64) -> Result<(), ChartError> {
         match self.range {
             None if self.scale == Scale::Logarithmic && start <= 0.0 => Err(self.not_positive()),
@@ -88,7 +88,7 @@ impl Axis {
         }
     }
 
-    /// Whether a value has a place on this axis, inside of its range or outside.
+    /// Whether a value can be shown on this axis, inside or outside its range.
     pub(super) fn holds(&self, value: f64) -> bool {
         self.scale.holds(value)
     }
@@ -142,13 +142,13 @@ impl<T: Into<String>> From<T> for Axis {
     }
 }
 
-/// The smallest positive number: ranges of the very smallest numbers are not empty either.
+/// The smallest positive number, so that ranges of the smallest numbers are not empty.
 const LEAST: f64 = f64::from_bits(1);
 
-/// A range around [low, high] that is not empty, within the finite numbers.
+/// A nonempty range around [low, high], within the finite numbers.
 fn widened_linear(low: f64, high: f64, margin: f64) -> (f64, f64) {
     let size = low.abs().max(high.abs());
-    // Numbers that differ by rounding only are one number.
+    // Numbers that differ by rounding only count as equal.
     let room = if high - low <= 1e-12 * size {
         if size == 0.0 {
             1.0
@@ -172,12 +172,12 @@ fn widened_logarithmic(low: f64, high: f64, margin: f64) -> (f64, f64) {
     ((low / factor).max(LEAST), (high * factor).min(f64::MAX))
 }
 
-/// A mark on an axis.
+/// A tick mark on an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tick {
-    /// Where, as a fraction of the axis.
+    /// The position as a fraction of the axis.
     pub(super) place: f64,
-    /// What stands there; small marks have no label.
+    /// The label; minor ticks have none.
     pub(super) label: Option<String>,
 }
 
@@ -191,13 +191,13 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Where on the axis a value is: 0 at its start, 1 at its end; none for what has no place.
+    /// The position of a value: 0 at the start of the axis, 1 at its end; `None` if it cannot be shown.
     pub(super) fn fraction(&self, value: f64) -> Option<f64> {
         Some(self.fraction_at(self.position(value)?))
     }
 
-    /// The place of a value as a finite number, also where the fraction would not be one, far outside: equal differences are equal lengths. None for what
-    /// has no place.
+    /// The position of a value as a finite number, also far outside the axis, where the fraction would overflow; equal
+    /// differences have equal lengths. `None` if the value cannot be shown.
     pub(super) fn position(&self, value: f64) -> Option<f64> {
         self.scale.holds(value).then(|| match self.scale {
             Scale::Linear => value,
@@ -213,7 +213,8 @@ impl Extent {
         }
     }
 
-    /// Decades from the start to a positive value: of their ratio, since the logarithms of nearly equal numbers may be equal.
+    /// The decades from the start to a positive value, by their ratio: the logarithms of nearly equal numbers may be
+    /// equal.
     fn decades_to(&self, value: f64) -> f64 {
         let ratio = value / self.start;
         if ratio.is_normal() {
@@ -227,7 +228,7 @@ impl Extent {
     pub(super) fn fraction_at(&self, position: f64) -> f64 {
         let (start, end) = self.ends();
         let part = |scale: f64| (scale * position - scale * start) / (scale * end - scale * start);
-        // Of large numbers halves, because the difference of two of them may be infinite.
+        // Large numbers are halved, since their difference may overflow.
         if start.abs().max(end.abs()) > 1e300 {
             part(0.5)
         } else {
@@ -246,7 +247,8 @@ impl Extent {
         }
     }
 
-    /// About as many labelled ticks as asked for, and two at least, unless no round numbers are so near to each other.
+    /// About as many labelled ticks as asked for, but at least two, unless there are no two round numbers this close to
+    /// each other.
     pub(super) fn ticks(&self, wanted: usize) -> Vec<Tick> {
         match self.scale {
             Scale::Linear => self.linear_ticks(wanted),
@@ -255,7 +257,7 @@ impl Extent {
     }
 
     fn tick(&self, value: f64, label: Option<String>) -> Option<Tick> {
-        // Ticks at the very ends, moved out by rounding, count.
+        // Ticks at the ends are kept even if rounding moves them outside.
         let place = self
             .fraction(value)
             .filter(|place| (-1e-9..=1.0 + 1e-9).contains(place))?;
@@ -267,12 +269,13 @@ impl Extent {
 
     fn linear_ticks(&self, wanted: usize) -> Vec<Tick> {
         let wanted = wanted.max(2);
-        // Steps are rounded up by as much as 2.5: few of them may leave one round number, or none; of five two always remain.
+        // Steps are rounded up by a factor of up to 2.5. If few are asked for, one round number or none may remain;
+        // with five, at least two remain.
         let parts = (wanted..5).find(|&parts| self.round_ticks(parts).len() >= 2);
         self.round_ticks(parts.unwrap_or(wanted.max(5)))
     }
 
-    /// Ticks at multiples of a round number, which is at least this part of the axis.
+    /// Ticks at multiples of a round number, which is at least the axis divided by `wanted`.
     fn round_ticks(&self, wanted: usize) -> Vec<Tick> {
         let step = round_step(self.end / wanted as f64 - self.start / wanted as f64);
         let first = (self.start / step - 1e-9).ceil();
@@ -288,17 +291,17 @@ impl Extent {
     fn logarithmic_ticks(&self, wanted: usize) -> Vec<Tick> {
         let (start, end) = (self.start.log10(), self.end.log10());
         let (first, last) = ((start - 1e-9).ceil() as i32, (end + 1e-9).floor() as i32);
-        // Half a decade or less looks linear.
+        // Up to half a decade, a logarithmic axis looks linear.
         if end - start < 0.7 {
             return self.linear_ticks(wanted);
         }
         let decades = (last - first + 1).max(0);
         let every = (decades as usize).div_ceil(wanted.max(2)).max(1) as i32;
         let multiples = last.div_euclid(every) - (first - 1).div_euclid(every);
-        // Of three powers every second one may be the middle one alone.
+        // With three powers, every second one may be only the middle one.
         let base = if multiples < 2 { first } else { 0 };
         let is_plain = (-2..=4).contains(&first) && (-2..=4).contains(&last);
-        // Where there is room for 2 and 5 between powers, or they are needed.
+        // Labels at 2 and 5 if there is room between the powers, or if they are needed.
         let few = decades < 2 || (decades < 3 && end - start <= wanted as f64);
         let mut ticks = Vec::new();
         for exponent in first - 1..=last {
@@ -325,12 +328,12 @@ impl Extent {
     }
 }
 
-/// The double nearest to a decimal number.
+/// The `f64` closest to a decimal number.
 fn parse(mantissa: i32, exponent: i32) -> f64 {
     format!("{mantissa}e{exponent}").parse().unwrap_or(f64::NAN)
 }
 
-/// 1, 2 or 5 times a power of ten, not below `step`.
+/// The least 1, 2 or 5 times a power of ten that is not below `step`.
 fn round_step(step: f64) -> f64 {
     let exponent = step.log10().floor() as i32;
     [1, 2, 5]
@@ -342,7 +345,8 @@ fn round_step(step: f64) -> f64 {
         .unwrap_or(step)
 }
 
-/// A number of an axis whose ticks are `step` apart and at most `largest`: with the decimals that tell it from its neighbours.
+/// The label of a number on an axis whose ticks are `step` apart and at most `largest`, with enough decimals to
+/// distinguish it from its neighbours.
 fn number(value: f64, step: f64, largest: f64) -> String {
     let value = if value.abs() < 1e-9 * step {
         0.0
@@ -351,7 +355,7 @@ fn number(value: f64, step: f64, largest: f64) -> String {
     };
     let digit = step.log10().floor() as i32;
     if (1e-4..1e6).contains(&largest) {
-        // No step, no digits: as many as there are integers would be too many to write.
+        // Without a step the number of decimals is undefined; all digits of an integer could be too many.
         let decimals = digit.checked_neg().map(usize::try_from);
         let decimals = decimals.and_then(Result::ok).unwrap_or(0);
         return minus(&format!("{value:.decimals$}"));
@@ -379,7 +383,7 @@ fn power(mantissa: i32, exponent: i32, is_plain: bool) -> String {
     }
 }
 
-/// With the typographic minus.
+/// Replaces the hyphen by the typographic minus sign.
 fn minus(text: &str) -> String {
     text.replace('-', "−")
 }
@@ -543,7 +547,7 @@ mod tests {
                 let range = start..start * (1.0 + 2.0 * width);
                 let extent = axis.clone().range(range.clone());
                 let extent = extent.extent(std::iter::empty(), 0.0).unwrap();
-                // So narrow an axis is linear, but for half its width; the middle is known to a rounding.
+                // The deviation from a linear axis is half the relative width; the middle is rounded to an ulp.
                 let slack = width + f64::EPSILON / width;
                 let middle = start * (1.0 + width);
                 let fraction = extent.fraction(middle).unwrap();

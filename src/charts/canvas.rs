@@ -1,4 +1,4 @@
-//! Drawing primitives over plotters, and the picture around them.
+//! Drawing primitives on top of plotters, and the SVG document around them.
 
 use super::clip::Point;
 use super::colours::Colour;
@@ -11,21 +11,22 @@ use plotters::prelude::{
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::error::Error;
 
-/// Units of plotters in a pixel. Its coordinates are integers, and curves of whole pixels have steps.
+/// Units of plotters per pixel. Its coordinates are integers, and curves rounded to whole pixels would have visible
+/// steps.
 const FINE: f64 = 10.0;
-/// What plotters divides font sizes by.
+/// The number by which plotters divides font sizes.
 const FONT: f64 = 1.24;
-/// Usual size of text, in pixels.
+/// The usual font size, in pixels.
 pub(super) const TEXT: f64 = 12.0;
-/// Width of a character of the usual size, in pixels: rather too much.
+/// The width of a character of the usual size, in pixels; an overestimate.
 pub(super) const CHARACTER: f64 = 7.0;
 
-/// How many characters of the usual width a text is wide.
+/// The width of a text in usual characters.
 pub(super) fn characters(text: &str) -> usize {
     text.chars().map(characters_of).sum()
 }
 
-/// Two of East Asian scripts and of pictures, one of all others.
+/// Two for East Asian scripts and pictographs, otherwise one.
 pub(super) fn characters_of(c: char) -> usize {
     match c {
         '\u{1100}'..='\u{115F}'
@@ -41,10 +42,10 @@ pub(super) fn characters_of(c: char) -> usize {
     }
 }
 
-/// The least and the largest side of a picture, in pixels.
+/// The limits of the sides of a picture, in pixels.
 const SIDES: (u32, u32) = (240, 8000);
 
-/// The sides of a picture, within reason.
+/// The sides of a picture, within the limits.
 pub(super) fn sides(width: u32, height: u32) -> (u32, u32) {
     (
         width.clamp(SIDES.0, SIDES.1),
@@ -52,7 +53,7 @@ pub(super) fn sides(width: u32, height: u32) -> (u32, u32) {
     )
 }
 
-/// An SVG picture: white, then `below` (SVG elements), then what is drawn.
+/// An SVG picture: a white background, then `below` (SVG elements), then the drawing.
 pub(super) fn picture(
     (width, height): (u32, u32),
     below: &str,
@@ -68,7 +69,7 @@ pub(super) fn picture(
         draw(&canvas)?;
         canvas.area.present().map_err(failed)?;
     }
-    // Our own opening tag in place of plotters': its size is in tenths of a pixel.
+    // Replaces the opening tag of plotters, whose size is in tenths of a pixel.
     let body = text.find('>').map_or("", |end| &text[end + 1..]);
     let (w, h) = (width * fine, height * fine);
     Ok(format!(
@@ -77,7 +78,7 @@ pub(super) fn picture(
     ))
 }
 
-/// An SVG element that shows a PNG in a rectangle of the picture, its pixels as they are.
+/// An SVG element with a PNG image in a rectangle of the picture, without interpolation.
 pub(super) fn image(png: &[u8], frame: &Frame) -> String {
     use base64::Engine;
     let data = base64::engine::general_purpose::STANDARD.encode(png);
@@ -89,7 +90,7 @@ pub(super) fn image(png: &[u8], frame: &Frame) -> String {
     )
 }
 
-/// A rectangle of the picture, in pixels, y downwards.
+/// A rectangle of the picture, in pixels, y downward.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub(super) left: f64,
@@ -107,7 +108,7 @@ impl Frame {
         self.bottom - self.top
     }
 
-    /// The point at fractions of the frame, from its lower left corner.
+    /// The point at given fractions of the frame, from its lower left corner.
     pub(super) fn at(&self, (x, y): Point) -> Point {
         (
             self.left + x * self.width(),
@@ -121,16 +122,16 @@ impl Frame {
     }
 }
 
-/// Where a text stands to its point.
+/// The position of a text relative to its point.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Anchor {
-    /// Its left end, at half height.
+    /// The left end is at the point, vertically centred.
     Left,
-    /// Its right end, at half height.
+    /// The right end is at the point, vertically centred.
     Right,
-    /// The middle of its top.
+    /// The centre of the top is at the point.
     Top,
-    /// Its middle, written upwards.
+    /// Centred at the point, written upward.
     Upwards,
 }
 
@@ -144,7 +145,7 @@ pub(super) enum Shape {
 }
 
 impl Shape {
-    /// The shape of the k-th series: another one when the colours come round again.
+    /// The shape for the k-th series; it changes when the colours repeat.
     pub(super) fn of_series(k: usize) -> Self {
         match (k + k / 8) % 4 {
             0 => Self::Circle,
@@ -155,7 +156,7 @@ impl Shape {
     }
 }
 
-/// What is drawn on; all lengths in pixels.
+/// The drawing area; all lengths in pixels.
 pub(super) struct Canvas<'a> {
     area: DrawingArea<SVGBackend<'a>, Shift>,
 }
@@ -172,7 +173,7 @@ impl Canvas<'_> {
         self.area.draw(&path).map_err(failed)
     }
 
-    /// A line of dashes of `dash` pixels with gaps of as many, continued around corners.
+    /// A dashed line; dashes and gaps have the length `dash` in pixels and continue around corners.
     pub(super) fn dashes(
         &self,
         points: &[Point],
@@ -192,7 +193,7 @@ impl Canvas<'_> {
     }
 
     pub(super) fn border(&self, frame: &Frame, colour: Colour) -> Result<(), ChartError> {
-        // Not plotters' rectangle, whose border is always a unit wide.
+        // The rectangle of plotters has a border one unit wide.
         let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)];
         self.line(&corners.map(|corner| frame.at(corner)), colour, 1.0)
     }
@@ -213,7 +214,7 @@ impl Canvas<'_> {
                 let circle = Circle::new(fine(at), (FINE * RADIUS) as i32, filled(colour));
                 self.area.draw(&circle).map_err(failed)
             }
-            // Of about the same area.
+            // The shapes have about the same area.
             Shape::Square => polygon(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
             Shape::Triangle => polygon(&[(0.0, -1.25), (1.15, 0.8), (-1.15, 0.8)]),
             Shape::Diamond => polygon(&[(0.0, -1.3), (1.3, 0.0), (0.0, 1.3), (-1.3, 0.0)]),
@@ -227,7 +228,7 @@ impl Canvas<'_> {
         anchor: Anchor,
         size: f64,
     ) -> Result<(), ChartError> {
-        // Control characters and two others are not allowed in XML, and a line is a line.
+        // Control characters and two other characters are not allowed in XML, and line breaks become spaces.
         let is_allowed = |c: char| !c.is_control() && !matches!(c, '\u{FFFE}' | '\u{FFFF}');
         let text: String = text
             .chars()

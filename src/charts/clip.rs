@@ -1,11 +1,11 @@
-//! Curves cut at the frame.
+//! Clips curves to the frame.
 
 /// A point of a picture, or a fraction of a frame.
 pub(super) type Point = (f64, f64);
 
-/// The parts of a curve inside the rectangle from `low` to `high`; `None` is a gap in it.
+/// The parts of a curve inside the rectangle from `low` to `high`; `None` is a gap in the curve.
 ///
-/// A curve that leaves and comes back is two parts, cut where it crosses the border. A part has at least two points.
+/// A curve that leaves and returns gives two parts, cut at the border. A part has at least two points.
 pub(super) fn parts(
     points: impl IntoIterator<Item = Option<Point>>,
     low: Point,
@@ -27,12 +27,12 @@ pub(super) fn parts(
     parts
 }
 
-/// Whether a point lies in the rectangle, its border included.
+/// Whether a point lies in the rectangle or on its border.
 pub(super) fn contains((x, y): Point, low: Point, high: Point) -> bool {
     (low.0..=high.0).contains(&x) && (low.1..=high.1).contains(&y)
 }
 
-/// The part of a segment inside the rectangle: cut by the upright borders, then by the level ones.
+/// The part of a segment inside the rectangle: clipped at the vertical borders, then at the horizontal ones.
 fn inside(from: Point, to: Point, low: Point, high: Point) -> Option<(Point, Point)> {
     let (from, to) = between(from, to, low.0, high.0)?;
     let turned = |(x, y): Point| (y, x);
@@ -40,7 +40,7 @@ fn inside(from: Point, to: Point, low: Point, high: Point) -> Option<(Point, Poi
     Some((turned(from), turned(to)))
 }
 
-/// The part of a segment with x from `low` to `high`. Ends inside stay as they are, so that parts can be joined.
+/// The part of a segment with x from `low` to `high`. Ends inside are unchanged, so that parts can be joined.
 fn between(from: Point, to: Point, low: f64, high: f64) -> Option<(Point, Point)> {
     if from.0.max(to.0) < low || from.0.min(to.0) > high {
         return None;
@@ -49,12 +49,13 @@ fn between(from: Point, to: Point, low: f64, high: f64) -> Option<(Point, Point)
         x if x == end.0 => end,
         x => (x, height_at(x, end, other)),
     };
-    // The second cut begins from the first, which is near however far away both ends are.
+    // The second cut starts from the first, which is close to the rectangle however far away the ends are.
     let from = cut(from, to);
     Some((from, cut(to, from)))
 }
 
-/// The height of the line through two points at an x between them, from the nearer one: the height of the other may be so large that it has no digits here.
+/// The y of the line through two points at an x between them, computed from the nearer one: the other y may be so large
+/// that it has no significant digits here.
 fn height_at(x: f64, a: Point, b: Point) -> f64 {
     let (near, far) = if (x - a.0).abs() <= (x - b.0).abs() {
         (a, b)
@@ -62,13 +63,13 @@ fn height_at(x: f64, a: Point, b: Point) -> f64 {
         (b, a)
     };
     let part = |scale: f64| (scale * x - scale * near.0) / (scale * far.0 - scale * near.0);
-    // Of large numbers halves, because the difference of two of them may be infinite.
+    // Large numbers are halved, since their difference may overflow.
     let part = if (far.0 - near.0).is_finite() {
         part(1.0)
     } else {
         part(0.5)
     };
-    // Exactly the same height on level lines.
+    // Exactly the same y on horizontal lines.
     near.1 + (part * far.1 - part * near.1)
 }
 
@@ -124,7 +125,7 @@ mod tests {
 
     #[test]
     fn ends_far_away_change_no_slope() {
-        // Up by a tenth, however far the curve goes; in both directions.
+        // It rises by a tenth, however far the curve extends; in both directions.
         for far in [1e3, 1e9, 1e30, 1e300] {
             for points in [
                 [(0.0, 1.0), (far, 1.0 + 0.1 * far)],
@@ -132,11 +133,11 @@ mod tests {
             ] {
                 let part = parts(points.map(Some), (0.0, 0.0), (4.0, 2.0)).remove(0);
                 let highest = part[0].1.max(part[1].1);
-                // 1 + 0.1 · 4, with roundings of the numbers of the segment.
+                // 1 + 0.1 · 4, up to rounding errors of the coordinates.
                 assert!((highest - 1.4).abs() < 1e-14, "{far}: {part:?}");
             }
         }
-        // Across, from one end of the numbers to the other.
+        // Across, from the lowest finite number to the largest.
         for far in [1e30, f64::MAX] {
             check(
                 &[Some((-far, 1.0)), Some((far, 1.0))],

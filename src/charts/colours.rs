@@ -1,4 +1,4 @@
-//! Colours that remain apart for the colour-blind.
+//! Colours that can be distinguished with colour blindness.
 
 /// A colour: red, green, blue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -11,9 +11,9 @@ impl Colour {
     pub const WHITE: Self = Self(255, 255, 255);
     /// The grey of cells without a value.
     pub const GREY: Self = Self(178, 178, 178);
-    /// Of reference lines.
+    /// The colour of reference lines.
     pub(super) const DARK_GREY: Self = Self(105, 105, 105);
-    /// Of the grid.
+    /// The colour of the grid.
     pub(super) const LIGHT_GREY: Self = Self(228, 228, 228);
 
     /// The k-th of eight colours, then from the first again. They are those of Okabe and Ito, which can be told apart
@@ -32,9 +32,9 @@ impl Colour {
         PALETTE[k % PALETTE.len()]
     }
 
-    /// From dark blue over green to yellow, evenly in lightness, by a fraction from 0 to 1.
+    /// A colour from dark blue over green to yellow, uniform in lightness, for a fraction from 0 to 1.
     pub(super) fn of_fraction(fraction: f64) -> Self {
-        /// Points of a curve through the colour space of constant steps in lightness, after the colours of matplotlib's "viridis".
+        /// Points on a curve through the colour space with equal steps in lightness, after "viridis" of matplotlib.
         const POINTS: [[f64; 3]; 9] = [
             [68.0, 1.0, 84.0],
             [71.0, 44.0, 122.0],
@@ -47,7 +47,7 @@ impl Colour {
             [253.0, 231.0, 37.0],
         ];
         let place = fraction.clamp(0.0, 1.0) * (POINTS.len() - 1) as f64;
-        // A cast of NaN is zero.
+        // A NaN is cast to zero.
         let below = (place as usize).min(POINTS.len() - 2);
         let part = place - below as f64;
         let mix = |k: usize| {

@@ -1,4 +1,4 @@
-//! Why there is no picture.
+//! The errors of charts.
 
 use crate::numbers::Short;
 use std::error::Error;

@@ -1,10 +1,10 @@
-//! Files by their endings.
+//! Writing of files; the format follows from the file name.
 
 use super::error::ChartError;
 use std::fs;
 use std::path::Path;
 
-/// The one of the known endings (with their dots) that the file name has.
+/// The known ending (including the dot) with which the file name ends.
 pub(super) fn ending(
     path: &Path,
     known: &'static [&'static str],
@@ -31,7 +31,7 @@ pub(super) fn write(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Chart
     })
 }
 
-/// A field of a CSV file: in quotes if it has to be.
+/// A field of a CSV file, quoted if necessary.
 pub(super) fn csv_field(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -40,7 +40,7 @@ pub(super) fn csv_field(text: &str) -> String {
     }
 }
 
-/// A number of a CSV file, in the shortest form that reads back exactly; nothing where there is none.
+/// A number of a CSV file, in the shortest form that reads back exactly; empty if there is none.
 pub(super) fn csv_number(value: Option<f64>) -> String {
     value
         .filter(|value| value.is_finite())

@@ -1,4 +1,4 @@
-//! Maps: a value or a class for every cell of a rectangle.
+//! Heat maps: a value or a class for every cell of a rectangle.
 
 mod image;
 
@@ -32,7 +32,7 @@ impl Class {
     }
 }
 
-/// What the cells hold.
+/// The contents of the cells.
 #[derive(Clone, Debug)]
 enum Cells {
     Values(Vec<Option<f64>>),
@@ -78,19 +78,19 @@ pub struct HeatMap {
     size: (u32, u32),
 }
 
-/// Numbers a picture can have in memory without a doubt, 16384².
+/// The largest number of cells, 16384²; such a picture fits into memory.
 const MOST_CELLS: usize = 1 << 28;
-/// From the frame to the colour bar, and the width of that, in pixels.
+/// The distance of the colour bar from the frame, and its width, in pixels.
 const BAR: (f64, f64) = (16.0, 16.0);
-/// Height of a row of the legend above the frame.
+/// The height of a line of the legend above the frame, in pixels.
 const LINE: f64 = 22.0;
-/// Where the legend begins at most, however wide the labels of the rows are, and where it ends before the side of the picture, in pixels.
+/// The largest left margin of the legend, however wide the row labels are, and its right margin, in pixels.
 const STRIP: (f64, f64) = (100.0, 20.0);
-/// Of an entry of the legend beside its name: the key and gaps, in pixels.
+/// The width of a legend entry without its name: the key and the gaps, in pixels.
 const AROUND_NAME: f64 = KEY + 20.0;
 
 impl HeatMap {
-    /// The `endings` that [`HeatMap::save`] knows.
+    /// The file name endings that [`HeatMap::save`] supports.
     const ENDINGS: &'static [&'static str] = &[".svg", ".png", ".csv"];
 
     /// A map of values, of the size (columns, rows); the function returns the value in column i and row j. A cell with
@@ -254,7 +254,7 @@ impl HeatMap {
                 (palette, Box::new(index))
             }
         };
-        // From the top row downwards.
+        // From the top row downward.
         let pixels: Vec<u8> = (0..self.rows)
             .rev()
             .flat_map(|j| (0..self.columns).map(move |i| j * self.columns + i))
@@ -279,7 +279,7 @@ impl HeatMap {
             let y = csv_number(Some(y.value(centre(j, self.rows))));
             for (i, x) in xs.iter().enumerate() {
                 let value = self.field(j * self.columns + i);
-                // Writing into a string cannot fail.
+                // Writing to a string cannot fail.
                 let _ = writeln!(text, "{x},{y},{value}");
             }
         }
@@ -323,7 +323,7 @@ impl HeatMap {
     fn extents(&self) -> Result<(Extent, Extent), ChartError> {
         self.check_cells()?;
         let extent = |axis: &Axis, count: usize| {
-            // Numbers of cells begin at zero.
+            // Indices of cells begin at zero.
             axis.check_start(0.0)?;
             axis.extent([0.0, count as f64].into_iter(), 0.0)
         };
@@ -345,10 +345,10 @@ impl HeatMap {
         Ok(Some(ColourBar { extent, ticks }))
     }
 
-    /// The legend above the frame, in lines. Entries that do not fit are counted.
+    /// The legend above the frame, line by line. Entries that do not fit are counted.
     fn strip(&self) -> Vec<Vec<Placed>> {
         let width = f64::from(self.size.0) - STRIP.0 - STRIP.1;
-        // More would leave no map.
+        // More lines would leave no room for the map.
         let most = (f64::from(self.size.1) / 4.0 / LINE) as usize;
         let longest = (((width - AROUND_NAME) / CHARACTER) as usize).min(40);
         let entries: Vec<Entry> = self
@@ -361,7 +361,7 @@ impl HeatMap {
         if lines.len() <= most {
             return lines;
         }
-        // Of names without a letter no more would fit.
+        // Even with empty names no more entries would fit.
         let room = most * (width / AROUND_NAME).ceil() as usize;
         (0..entries.len().min(room))
             .rev()
@@ -374,7 +374,7 @@ impl HeatMap {
             .unwrap_or_default()
     }
 
-    /// What the legend names: classes, cells without a value, curves.
+    /// The entries of the legend: classes, cells without a value, curves.
     fn entries(&self) -> Vec<(String, Key)> {
         let mut entries = Vec::new();
         if let Cells::Classes(_, classes) = &self.cells {
@@ -398,12 +398,12 @@ impl HeatMap {
     }
 }
 
-/// A name of the legend with its key; the count of those left out has none.
+/// The name and the key of a legend entry; the entry that counts omitted ones has no key.
 type Entry = (String, Option<Key>);
-/// An entry, after how far to the right it begins, in pixels.
+/// A legend entry with its horizontal position, in pixels.
 type Placed = (f64, Entry);
 
-/// Entries one after the other in lines of this width.
+/// Distributes entries over lines of a given width.
 fn in_lines(entries: &[Entry], width: f64) -> Vec<Vec<Placed>> {
     let mut lines: Vec<Vec<Placed>> = Vec::new();
     let mut used = f64::INFINITY;
@@ -427,7 +427,7 @@ fn is_too_large((columns, rows): (usize, usize)) -> bool {
         .is_none_or(|cells| cells > MOST_CELLS)
 }
 
-/// The cells row by row from the bottom; none where they are too many, which is an error later.
+/// The cells row by row from the bottom; empty if there are too many, which is reported later.
 fn filled<T>(
     size: (usize, usize),
     mut cell: impl FnMut(usize, usize) -> Option<T>,
@@ -443,7 +443,7 @@ fn filled<T>(
     cells
 }
 
-/// Black and colours that are seen on most images, in turn.
+/// Black and colours that are visible on most images, in turn.
 fn curve_key(k: usize) -> Key {
     const COLOURS: [Colour; 4] = [
         Colour::BLACK,
@@ -464,7 +464,7 @@ fn draw_curve(canvas: &Canvas<'_>, plot: &Plot, curve: &Curve, key: Key) -> Resu
     Ok(())
 }
 
-/// The scale of the colours, to the right of the frame.
+/// The colour scale, to the right of the frame.
 struct ColourBar {
     extent: Extent,
     ticks: Vec<super::axis::Tick>,

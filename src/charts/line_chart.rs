@@ -191,8 +191,8 @@ impl Chart {
         text
     }
 
-    /// The points that have a place on both axes: what has none on one does not stretch the other. If there are none, all finite ones, so that the axis
-    /// that holds none says so.
+    /// The points that can be shown on both axes, so that a point missing on one axis does not extend the other. If
+    /// there are none, all finite points, so that the axis that cannot show them reports it.
     fn points_to_fit(&self) -> Vec<Point> {
         let all = self.series.iter().flat_map(|series| &series.points);
         let finite = all.filter(|(x, y)| x.is_finite() && y.is_finite());
@@ -204,7 +204,7 @@ impl Chart {
         if drawn.is_empty() { finite } else { drawn }
     }
 
-    /// How each series is drawn. Reference lines take no colour from the others.
+    /// The drawing style of each series. Reference lines do not use up colours.
     fn keys(&self) -> Vec<Key> {
         let mut coloured = 0..;
         let key = |series: &Series| {
@@ -254,17 +254,17 @@ fn draw_series(
     Ok(())
 }
 
-/// Names and how they are drawn, beside the frame.
+/// The names and the styles of the series, beside the frame.
 struct Legend {
     entries: Vec<(String, Key)>,
 }
 
 impl Legend {
-    /// Between the frame and the legend, in pixels.
+    /// The gap between the frame and the legend, in pixels.
     const GAP: f64 = 14.0;
     const LINE: f64 = 20.0;
 
-    /// Beside a frame of this height.
+    /// The width of the legend beside a frame of a given height.
     fn width(&self, height: f64) -> f64 {
         let long = |text: &str| CHARACTER * characters(text) as f64;
         let entries = self.entries.iter().map(|(name, _)| KEY + long(name));
@@ -278,7 +278,7 @@ impl Legend {
         Self::GAP + 14.0 + entries.max(rest)
     }
 
-    /// How many entries stand beside a frame of this height, one line less if not all do.
+    /// The number of entries that fit beside a frame of a given height; one less if not all fit.
     fn shown(&self, height: f64) -> usize {
         let most = (height / Self::LINE) as usize;
         if self.entries.len() <= most {
@@ -288,7 +288,7 @@ impl Legend {
         }
     }
 
-    /// From its upper left corner; entries that do not fit are counted.
+    /// Draws the legend from its upper left corner; entries that do not fit are counted.
     fn draw(&self, canvas: &Canvas<'_>, (left, top): Point, height: f64) -> Result<(), ChartError> {
         let shown = self.shown(height);
         let at = |k: usize| (left + Self::GAP, top + Self::LINE * (k as f64 + 0.5));

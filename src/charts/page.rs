@@ -1,4 +1,4 @@
-//! Pages: text, tables and pictures in one HTML file.
+//! Pages: text, tables and charts in one HTML file.
 
 use super::error::ChartError;
 use super::file::{ending, write};

@@ -1,4 +1,4 @@
-//! What every picture with two axes has: title, frame, ticks, labels, a legend.
+//! The common parts of pictures with two axes: title, frame, ticks, labels and legend.
 
 use super::axis::{Extent, Tick};
 use super::canvas::{Anchor, CHARACTER, Canvas, Frame, Shape, TEXT, characters, characters_of};
@@ -6,11 +6,11 @@ use super::clip::{self, Point};
 use super::colours::Colour;
 use super::error::ChartError;
 
-/// Length of a labelled tick, in pixels.
+/// The length of a labelled tick, in pixels.
 const TICK: f64 = 5.0;
-/// Size of the title.
+/// The font size of the title.
 const TITLE: f64 = 16.0;
-/// Between the end of a title or a label and the side of the picture, in pixels.
+/// The least distance of a title or a label from the side of the picture, in pixels.
 const BESIDE_TEXT: f64 = 4.0;
 
 /// Two axes around a frame.
@@ -20,22 +20,22 @@ pub(super) struct Plot {
     pub(super) y: Extent,
     x_ticks: Vec<Tick>,
     y_ticks: Vec<Tick>,
-    /// Of the picture, in pixels.
+    /// The size of the picture, in pixels.
     sides: (f64, f64),
 }
 
-/// What a picture needs around its frame, in pixels.
+/// The space that a picture needs around its frame, in pixels.
 pub(super) struct Room {
-    /// The picture.
+    /// The size of the picture.
     pub(super) sides: (u32, u32),
-    /// Above the frame, beside the title.
+    /// Above the frame, in addition to the title.
     pub(super) above: f64,
-    /// To the right of it.
+    /// To the right of the frame.
     pub(super) right: f64,
 }
 
 impl Room {
-    /// The top and the bottom of the frame, in pixels.
+    /// The y of the top and of the bottom of the frame, in pixels.
     pub(super) fn top_and_bottom(&self, title: &str) -> (f64, f64) {
         let top = if title.is_empty() { 14.0 } else { 42.0 } + self.above;
         let bottom = f64::from(self.sides.1) - 52.0;
@@ -44,11 +44,11 @@ impl Room {
 }
 
 impl Plot {
-    /// Axes that fill the picture except for their labels and the room for others.
+    /// Axes that fill the picture except for their labels and the space for other parts.
     pub(super) fn new(x: Extent, y: Extent, title: &str, room: &Room) -> Self {
         let width = f64::from(room.sides.0);
         let (top, bottom) = room.top_and_bottom(title);
-        // About 50 pixels apart.
+        // Ticks about 50 pixels apart.
         let y_ticks = y.ticks(((bottom - top) / 50.0) as usize);
         let left = 40.0 + CHARACTER * longest(&y_ticks) as f64;
         let sides = |beside: f64| {
@@ -56,7 +56,7 @@ impl Plot {
             (left, (width - room.right.max(beside)).max(left + 40.0))
         };
         let (left, right) = sides(0.0);
-        // Half of a label at an end of the axis stands beside the frame.
+        // Half of a label at the end of an axis extends beyond the frame.
         let beside = 0.5 * CHARACTER * longest(&ticks_across(&x, right - left)) as f64;
         let (left, right) = sides(beside);
         let x_ticks = ticks_across(&x, right - left);
@@ -75,7 +75,7 @@ impl Plot {
         }
     }
 
-    /// The parts of a curve inside the frame, in pixels. Points without a place are gaps in it.
+    /// The parts of a curve inside the frame, in pixels. Points that cannot be shown are gaps.
     pub(super) fn lines(&self, points: &[Point]) -> Vec<Vec<Point>> {
         let (low, high) = self.corners();
         let positions = points.iter().map(|point| self.position(*point));
@@ -95,7 +95,7 @@ impl Plot {
             .collect()
     }
 
-    /// The points inside the frame that no line reaches, because their neighbours have no place, in pixels.
+    /// The points inside the frame, in pixels, to which no line leads because their neighbours cannot be shown.
     pub(super) fn alone(&self, points: &[Point]) -> Vec<Point> {
         let (low, high) = self.corners();
         let positions: Vec<_> = points.iter().map(|point| self.position(*point)).collect();
@@ -108,7 +108,7 @@ impl Plot {
             .collect()
     }
 
-    /// Where a point lies on the axes, also outside the frame; none for what has no place.
+    /// The position of a point on the axes, also outside the frame; `None` if it cannot be shown.
     fn position(&self, (x, y): Point) -> Option<Point> {
         Some((self.x.position(x)?, self.y.position(y)?))
     }
@@ -125,7 +125,7 @@ impl Plot {
         self.frame.at(fractions)
     }
 
-    /// Lines at the labelled ticks.
+    /// Draws grid lines at the labelled ticks.
     pub(super) fn draw_grid(&self, canvas: &Canvas<'_>) -> Result<(), ChartError> {
         let line = |from, to| {
             let ends = [self.frame.at(from), self.frame.at(to)];
@@ -140,7 +140,7 @@ impl Plot {
         Ok(())
     }
 
-    /// Frame, ticks, labels and title, over what was drawn before.
+    /// Draws the frame, ticks, labels and title on top of the contents.
     pub(super) fn draw_axes(&self, canvas: &Canvas<'_>, title: &str) -> Result<(), ChartError> {
         let frame = &self.frame;
         canvas.border(frame, Colour::BLACK)?;
@@ -160,7 +160,7 @@ impl Plot {
         canvas.text(&title, (frame.left, 22.0), Anchor::Left, size)
     }
 
-    /// The label of an upright axis, its middle at `x` and half way up the frame.
+    /// Draws the label of a vertical axis, centred at `x` and at half the height of the frame.
     pub(super) fn draw_upwards(
         &self,
         canvas: &Canvas<'_>,
@@ -173,21 +173,22 @@ impl Plot {
     }
 }
 
-/// The length of the longest text around `middle` in a picture of this side.
+/// The length of the longest text that can be centred at `middle` in a picture with this side.
 fn around(middle: f64, side: f64) -> f64 {
     2.0 * (middle.min(side - middle) - BESIDE_TEXT)
 }
 
-/// A text that has so many pixels, and its size: at most a quarter smaller than usual, then cut.
+/// A text that fits into the given number of pixels, and its font size: up to a quarter smaller than usual, then
+/// shortened.
 fn fitted(text: &str, usual: f64, room: f64) -> (String, f64) {
     let width = CHARACTER / TEXT;
-    // Rounding must not cut what just fits.
+    // A text that fits exactly must not be shortened because of rounding.
     let room = room * (1.0 + 1e-9);
     let size = (room / (width * characters(text) as f64)).clamp(0.75 * usual, usual);
     (shortened(text, (room / (width * size)) as usize), size)
 }
 
-/// Ticks along a frame of this width, their labels apart: about 90 pixels, or more where they are long.
+/// The ticks along a horizontal axis of this width: about 90 pixels apart, or more if labels are long.
 fn ticks_across(x: &Extent, width: f64) -> Vec<Tick> {
     let mut wanted = (width / 90.0) as usize;
     loop {
@@ -200,7 +201,7 @@ fn ticks_across(x: &Extent, width: f64) -> Vec<Tick> {
     }
 }
 
-/// Takes the labels that would touch the one before from ticks in ascending order; whether there were none.
+/// Removes labels that would touch the previous one, from ticks in ascending order; returns whether none did.
 fn thin(ticks: &mut [Tick], width: f64) -> bool {
     let mut were_apart = true;
     let mut end = f64::NEG_INFINITY;
@@ -221,14 +222,14 @@ fn thin(ticks: &mut [Tick], width: f64) -> bool {
     were_apart
 }
 
-/// On which side of its line a tick stands.
+/// The side of its line on which a tick is drawn.
 #[derive(Clone, Copy)]
 pub(super) enum Side {
     Left,
     Right,
 }
 
-/// Ticks along a vertical line at `x`, as high as the frame.
+/// Draws the ticks along a vertical line at `x` over the height of the frame.
 pub(super) fn draw_ticks(
     canvas: &Canvas<'_>,
     x: f64,
@@ -257,13 +258,13 @@ fn length(tick: &Tick) -> f64 {
     }
 }
 
-/// Characters of the longest label.
+/// The number of characters of the longest label.
 pub(super) fn longest(ticks: &[Tick]) -> usize {
     let length = |tick: &Tick| tick.label.as_ref().map_or(0, |label| label.chars().count());
     ticks.iter().map(length).max().unwrap_or(0)
 }
 
-/// A text cut to so many characters of the usual width.
+/// Shortens a text to a number of usual characters.
 pub(super) fn shortened(text: &str, most: usize) -> String {
     if characters(text) <= most {
         return text.to_owned();
@@ -281,12 +282,12 @@ pub(super) fn shortened(text: &str, most: usize) -> String {
     short
 }
 
-/// What stands in a legend for entries that do not fit.
+/// The legend entry that counts the entries that do not fit.
 pub(super) fn and_more(count: usize) -> String {
     format!("… and {count} more")
 }
 
-/// How something is shown in a legend, and drawn.
+/// How a series is drawn, in the chart and in the legend.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Key {
     Line(Colour),
@@ -294,27 +295,27 @@ pub(super) enum Key {
     Markers(Colour, Shape),
     Dashes(Colour),
     Area(Colour),
-    /// A line on an image, with a light rim.
+    /// A line on an image, with a light outline.
     Outlined(Colour),
 }
 
-/// Whether two points are one in a picture, whose places are tenths of pixels.
+/// Whether two points coincide in a picture, which has a resolution of a tenth of a pixel.
 fn is_near(a: Point, b: Point) -> bool {
     (a.0 - b.0).abs() < 0.1 && (a.1 - b.1).abs() < 0.1
 }
 
-/// Width of a key in the legend, in pixels.
+/// The width of a key in the legend, in pixels.
 pub(super) const KEY: f64 = 26.0;
-/// Width of lines, in pixels.
+/// The width of lines, in pixels.
 const STROKE: f64 = 1.8;
 
 impl Key {
-    /// Draws a line of this kind.
+    /// Draws a line in this style.
     pub(super) fn draw_line(self, canvas: &Canvas<'_>, line: &[Point]) -> Result<(), ChartError> {
         if let Some(&first) = line.first()
             && line.iter().all(|at| is_near(*at, first))
         {
-            // Nothing would be seen of a line without length, as of a motion at rest.
+            // A line without length, as of a motion at rest, would not be visible.
             return self.draw_dot(canvas, first);
         }
         match self {
@@ -330,7 +331,7 @@ impl Key {
         }
     }
 
-    /// Draws a point of a line that has no neighbours, if no marker shows it.
+    /// Draws an isolated point of a line, if no marker shows it.
     pub(super) fn draw_dot(self, canvas: &Canvas<'_>, at: Point) -> Result<(), ChartError> {
         match self {
             Self::Line(colour) | Self::Dashes(colour) | Self::Outlined(colour) => {
@@ -340,7 +341,7 @@ impl Key {
         }
     }
 
-    /// Draws its marker at a point, if it has one.
+    /// Draws the marker of this style at a point, if it has one.
     pub(super) fn draw_marker(self, canvas: &Canvas<'_>, at: Point) -> Result<(), ChartError> {
         match self {
             Self::LineWithMarkers(colour, shape) | Self::Markers(colour, shape) => {
@@ -350,7 +351,7 @@ impl Key {
         }
     }
 
-    /// Draws the entry of a legend, its left end at a point.
+    /// Draws the key of a legend entry and its name, with the left end at a point.
     pub(super) fn draw_entry(
         self,
         canvas: &Canvas<'_>,

@@ -1,10 +1,10 @@
-//! Cells as PNG images: a byte a cell, the index of a colour.
+//! Cells as PNG images with a palette: one byte per cell.
 
 use crate::charts::axis::Extent;
 use crate::charts::colours::Colour;
 use crate::charts::error::ChartError;
 
-/// Levels of the colour scale; one more index says that there is no value.
+/// The number of levels of the colour scale; one more index marks cells without a value.
 const LEVELS: usize = 255;
 
 /// The colours of the levels, and of cells without a value.
@@ -22,18 +22,19 @@ pub(super) fn level_of(value: Option<f64>, extent: &Extent) -> u8 {
     let Some(value) = value.filter(|value| value.is_finite()) else {
         return LEVELS as u8;
     };
-    // What is not positive on a logarithmic scale is below all that is.
+    // On a logarithmic scale, values that are not positive get the lowest level.
     let fraction = extent.fraction(value).unwrap_or(0.0).clamp(0.0, 1.0);
     (fraction * (LEVELS - 1) as f64).round() as u8
 }
 
-/// The colour scale, its largest value on top.
+/// The image of the colour scale, with the largest value at the top.
 pub(super) fn scale() -> Result<Vec<u8>, ChartError> {
     let pixels: Vec<u8> = (0..LEVELS as u8).rev().collect();
     encode((1, LEVELS), &levels(), &pixels)
 }
 
-/// A PNG image of (columns, rows) pixels, row by row from the top; each is an index into the palette, of at most 256 colours.
+/// A PNG image of (columns, rows) pixels, row by row from the top; each pixel is an index into the palette of at most
+/// 256 colours.
 pub(super) fn encode(
     (columns, rows): (usize, usize),
     palette: &[Colour],
@@ -48,7 +49,7 @@ pub(super) fn encode(
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_palette(palette_bytes(palette));
     encoder.set_compression(png::Compression::Balanced);
-    // Differences of indices say nothing, but long runs of equal ones do.
+    // Filters by differences of indices would not help, but long runs of equal indices compress well.
     encoder.set_filter(png::Filter::NoFilter);
     let failed = |error: png::EncodingError| ChartError::Drawing {
         source: Box::new(error),

@@ -63,7 +63,7 @@ fn the_picture_is_xml_with_the_image_in_the_frame() {
     assert_eq!(images.len(), 2, "cells and colour bar");
     let number = |name: &str| -> f64 { images[0].attribute(name).unwrap().parse().unwrap() };
     let (x, y) = (number("x"), number("y"));
-    // The curve goes from side to side, at half height.
+    // The curve extends from side to side, at half height.
     let expected = format!(
         "{:.0},{:.0} {:.0},{:.0} ",
         x,

@@ -67,7 +67,7 @@ fn text_is_escaped_and_complete() {
     let root = root.root_element();
     assert_eq!(root.attribute("width"), Some("720"));
     assert_eq!(root.attribute("viewBox"), Some("0 0 7200 4400"));
-    // Several charts in one page.
+    // Several charts fit into one page.
     assert!(!svg.contains("id="));
     let odd = waves().x("bell \u{7}, zero \0, none \u{FFFE}");
     let odd = odd.y("\u{FFFF}").to_svg().unwrap();
@@ -95,7 +95,7 @@ fn curves_are_cut_at_the_frame() {
     assert!(curves[3][0].0 > right, "the legend stands beside the frame");
 }
 
-/// Where the labels below the frame begin and end, at 7 pixels a character, in tenths of a pixel.
+/// The extents of the labels below the frame, at 7 pixels per character, in tenths of a pixel.
 fn labels_below(svg: &str) -> Vec<(f64, f64)> {
     let [.., bottom] = frame(svg);
     let document = Document::parse(svg).unwrap();
@@ -136,13 +136,13 @@ fn long_labels_stand_apart_and_inside_the_picture() {
             let chart = Chart::new("").x(axis.clone()).line("", [(1.0, 1.0)]);
             let svg = chart.size(width, 440).to_svg().unwrap();
             let labels = labels_below(&svg);
-            // In a small picture there may be room for one.
+            // A small picture may have room for only one.
             let least = if width == 720 { 2 } else { 1 };
             assert!(labels.len() >= least, "{axis:?}, {width}");
             for pair in labels.windows(2) {
                 assert!(pair[0].1 <= pair[1].0, "{axis:?}, {width}: {labels:?}");
             }
-            // Places are rounded to tenths of a pixel.
+            // Positions are rounded to tenths of a pixel.
             let (first, last) = (labels[0].0, labels[labels.len() - 1].1);
             let side = 10.0 * f64::from(width);
             assert!(
@@ -168,7 +168,7 @@ fn long_titles_and_labels_end_inside_the_picture() {
                 continue;
             };
             let number = |name: &str| -> f64 { node.attribute(name).unwrap().parse().unwrap() };
-            // At 7 pixels a character of 12.
+            // 7 pixels for each of 12 characters.
             let length = number("font-size") * 7.0 / 12.0 * text.trim().chars().count() as f64;
             let is_upwards = node.attribute("transform").is_some();
             let (at, side) = if is_upwards {
@@ -187,7 +187,7 @@ fn long_titles_and_labels_end_inside_the_picture() {
         }
         assert_eq!(cut, 3, "{width}");
     }
-    // A short one has its usual size, a longer one is smaller, and whole.
+    // A short title has its usual size; a longer one is smaller, but complete.
     let size = |svg: &str, title: &str| -> f64 {
         let document = Document::parse(svg).unwrap();
         let mut nodes = document.descendants();
@@ -205,7 +205,7 @@ fn long_titles_and_labels_end_inside_the_picture() {
     assert!((120.0..159.0).contains(&smaller), "{smaller}");
 }
 
-/// Characters as wide as they are high: 60 of them are wider than the picture, and a legend of 40 than its third.
+/// Characters as wide as high: 60 of them are wider than the picture, and 40 in a legend are wider than a third of it.
 #[test]
 fn wide_characters_take_their_room() {
     let names = ["振".repeat(60), "動".repeat(40)];
@@ -242,7 +242,7 @@ fn curves_that_end_far_away_keep_their_slope() {
     let [left, top, right, bottom] = frame(&svg);
     let curve = &lines(&svg, Colour::of_series(0))[0];
     assert_eq!(curve[0], (left, bottom));
-    // Out at the top, half way to the right; each of three numbers is rounded to tenths of a pixel.
+    // The curve leaves at the top, half way to the right; each of three numbers is rounded to tenths of a pixel.
     assert!((curve[1].0 - f64::midpoint(left, right)).abs() <= 1.0);
     assert_eq!(curve[1].1, top);
 }
@@ -289,7 +289,7 @@ fn points_without_neighbours_are_dots() {
     for style in [Style::Line, Style::LineWithMarkers, Style::Reference] {
         assert_eq!(dots(style, &gaps[..1]), 1, "{style:?}");
     }
-    // A motion at rest: a line without length, which is not seen.
+    // A motion at rest: a line without length is not visible.
     for style in [Style::Line, Style::Reference] {
         assert_eq!(dots(style, &[(1.0, 1.0); 3]), 1, "{style:?}");
     }
@@ -306,7 +306,7 @@ fn points_without_a_place_do_not_stretch_the_other_axis() {
     ] {
         let [left, top, right, bottom] = frame(&svg);
         let curve = &lines(&svg, Colour::of_series(0))[0];
-        // All but margins of 0.03 and 0.05 of its size at each end.
+        // The whole size except for margins of 0.03 and 0.05 at each end.
         assert!(curve[1].0 - curve[0].0 > 0.9 * (right - left));
         assert!(curve[0].1 - curve[1].1 > 0.9 * (bottom - top));
     }
@@ -314,7 +314,7 @@ fn points_without_a_place_do_not_stretch_the_other_axis() {
 
 #[test]
 fn a_straight_line_stays_straight_on_both_scales() {
-    // x⁴ on logarithmic axes; a tenth of a pixel is the resolution, and each coordinate is rounded by half of it.
+    // x⁴ on logarithmic axes. The resolution is a tenth of a pixel, so each coordinate is rounded by up to half of it.
     let chart = Chart::new("")
         .x(Axis::new("x").scale(Scale::Logarithmic))
         .y(Axis::new("y").scale(Scale::Logarithmic))
@@ -380,7 +380,7 @@ fn the_number_of_entries_left_out_stands_inside_the_picture() {
         .find(|node| node.text().unwrap().trim().starts_with('…'))
         .unwrap();
     let left: f64 = rest.attribute("x").unwrap().parse().unwrap();
-    // At 7 pixels a character.
+    // At 7 pixels per character.
     let length = rest.text().unwrap().trim().chars().count();
     assert!(left + 70.0 * length as f64 <= 7200.0, "{left}, {length}");
 }

@@ -21,7 +21,7 @@ fn page() -> Page {
         )
 }
 
-/// The body as XML, which what we write happens to be.
+/// The body; the HTML that we write is also valid XML.
 fn body(html: &str) -> String {
     let start = html.find("<body>").unwrap();
     let end = html.find("</body>").unwrap() + "</body>".len();
