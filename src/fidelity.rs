@@ -1,4 +1,4 @@
-//! Model comparison: which of several models of one scene, with which element and step size, is just accurate enough.
+//! Model comparison: which of several models of one system, with which element and step size, is just accurate enough.
 
 mod error;
 mod ladder;
@@ -251,7 +251,7 @@ impl<'m> Fidelity<'m> {
         })
     }
 
-    /// The steps of all runs, the longest first: a part of the span, halved again and again.
+    /// The meshes of all runs, from the longest step on; each step is half the previous one.
     fn grids(&self) -> Result<Vec<Grid>, FidelityError> {
         if self.rungs.is_empty() {
             return Err(FidelityError::NoRungs);
@@ -283,7 +283,7 @@ impl<'m> Fidelity<'m> {
         halvings.map(grid).collect()
     }
 
-    /// The outputs that are compared, and in which columns of each rung they are.
+    /// The outputs that are compared, and their columns in each rung.
     fn wanted(&self) -> Result<(Vec<String>, Vec<Vec<usize>>), FidelityError> {
         let mut declared = Vec::new();
         for (k, (name, rung)) in self.rungs.iter().enumerate() {
@@ -327,7 +327,7 @@ impl<'m> Fidelity<'m> {
     }
 }
 
-/// The names that are in all lists, in the order of the last.
+/// The names that are in all lists, in the order of the last list.
 fn common(declared: &[Vec<String>]) -> Vec<String> {
     let Some((last, others)) = declared.split_last() else {
         return Vec::new();
@@ -337,7 +337,7 @@ fn common(declared: &[Vec<String>]) -> Vec<String> {
 }
 
 impl fmt::Debug for Fidelity<'_> {
-    /// What is to be run; models may have nothing to show.
+    /// Shows the settings; models need not be `Debug`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let names: Vec<_> = self.rungs.iter().map(|(name, _)| name).collect();
         f.debug_struct("Fidelity")

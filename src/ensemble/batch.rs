@@ -1,4 +1,4 @@
-//! Trajectories of an ensemble that goes on: those that are moved by one processor at a time.
+//! Batches: the trajectories of a resumable ensemble that one thread advances at a time.
 
 use super::ends::Outcome;
 use super::members::{Members, Models};
@@ -13,12 +13,13 @@ use tfe_runtime::bundle::Bundle;
 use tfe_runtime::step::Stepper;
 use tfe_runtime::{Model, State, Statistics};
 
-/// Trajectories that are moved one after the other, or side by side.
+/// Trajectories that are advanced one after the other, or side by side in vector lanes.
 pub(super) trait Batch<'m, M, const N: usize, K, L: Length<N>>: Send + Sync {
-    /// How many there are.
+    /// The number of trajectories.
     fn count(&self) -> usize;
 
-    /// Over the rest of the mesh: the runs from `first` on. What is `finished` has its number within the batch.
+    /// Advances the runs over the rest of the mesh; `first` is the index of the first one in the ensemble. `finished`
+    /// is called with the index within the batch.
     fn drive(
         &mut self,
         ensemble: &Ensemble<'m, M, N, K, L>,
@@ -33,12 +34,12 @@ pub(super) trait Batch<'m, M, const N: usize, K, L: Length<N>>: Send + Sync {
 
 pub(super) type AnyBatch<'m, M, const N: usize, K, L> = Box<dyn Batch<'m, M, N, K, L> + 'm>;
 
-/// A run as a [`Simulation`](crate::Simulation) makes it, in parts.
+/// A single resumable run, made by a [`Simulation`](crate::Simulation).
 pub(super) enum Resumed<const N: usize, L: Length<N>> {
     /// Not begun.
     At(f64, L::State),
     Going(Box<Checkpoint<N, L>>),
-    /// By an event, or an error.
+    /// Ended by an event or an error.
     Ended(Box<Outcome<N, L>>),
 }
 
@@ -83,7 +84,7 @@ where
         *self = match &motion {
             Ok(motion) => match motion.checkpoint() {
                 Some(checkpoint) => Self::Going(Box::new(checkpoint.clone())),
-                // At an event, unless parameters were set.
+                // Stopped by an event; a run whose parameters were set cannot be resumed.
                 None if motion.settings().is_empty() || motion.last().t != plan.end => {
                     Self::Ended(Box::new(outcome.clone()))
                 }
@@ -103,7 +104,7 @@ where
     }
 }
 
-/// Runs of a model of fixed size without events, each by steps of the mesh.
+/// Runs of a model of fixed size without events, advanced step by step.
 pub(super) enum Stepped<'m, M, const N: usize, T> {
     /// Not begun: the starts.
     At(Vec<State<N>>),
@@ -140,7 +141,7 @@ where
     ) -> Statistics {
         if let Self::At(starts) = self {
             if plan.mesh.steps() == 0 {
-                // The first element tells whether they are on the constraints.
+                // The first element checks the constraints.
                 for (lane, start) in starts.iter().enumerate() {
                     let model = ensemble.models.model(first + lane);
                     finished(lane, plan.at_rest(model, start));
@@ -150,7 +151,7 @@ where
             *self = Self::begin(ensemble, plan, first, starts);
         }
         match self {
-            // Made above.
+            // It was created above.
             Self::At(_) => Statistics::default(),
             Self::Lanes(lanes) => {
                 let Lanes {
@@ -192,7 +193,7 @@ where
 }
 
 impl<'m, M: Model<N> + Sync, const N: usize, T> Stepped<'m, M, N, T> {
-    /// The runs from `first` on, as many as there are starts.
+    /// Creates the stepper of the runs from `first` on, one for each start.
     fn begin<K: Members<'m, M, N, Lanes = T>>(
         ensemble: &Ensemble<'m, M, N, K>,
         plan: &Plan<N>,

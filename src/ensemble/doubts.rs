@@ -1,4 +1,4 @@
-//! What is doubtful about runs that came to their ends.
+//! Warnings about the runs of an ensemble that reached their ends.
 
 use crate::evaluate::Evaluate;
 use crate::length::Length;
@@ -21,7 +21,8 @@ pub struct WarningCounts {
 }
 
 impl WarningCounts {
-    /// Of one run, by the energies at its start and its end, which `rounding` says what may be rounded by.
+    /// The warnings of one run, from the energies at its start and its end; `rounding` returns the rounding error of
+    /// the energy.
     pub(super) fn of(
         is_conserved: bool,
         before: Energy,
@@ -61,22 +62,22 @@ impl fmt::Display for WarningCounts {
     }
 }
 
-/// The energy of a state.
+/// The energy at a state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Energy {
     energy: f64,
-    /// Half of p·v stands for it, whatever the Hamiltonian.
+    /// Half of p·v, as a scale, for every Hamiltonian.
     kinetic: f64,
 }
 
 impl Energy {
-    /// Of what is no state.
+    /// The energy of an invalid state.
     pub(super) const UNKNOWN: Self = Self {
         energy: f64::NAN,
         kinetic: 0.0,
     };
 
-    /// Not a number where no velocity belongs to the momentum.
+    /// The energy at a state; NaN if no velocity belongs to the momentum.
     pub(super) fn of<M, L, const N: usize>(model: &M, t: f64, state: &L::State) -> Self
     where
         M: Evaluate<N, L>,
@@ -86,7 +87,7 @@ impl Energy {
         Self::at(model, &Node::new(model, t, state, &L::zero(p)))
     }
 
-    /// The same where the velocity is known.
+    /// The energy at a node, whose velocity is known.
     pub(super) fn at<M, L, const N: usize>(model: &M, node: &Node<N, L>) -> Self
     where
         M: Evaluate<N, L>,

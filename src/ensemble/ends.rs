@@ -1,4 +1,4 @@
-//! What an ensemble came to.
+//! The result of an ensemble: the ends of its runs.
 
 use super::doubts::WarningCounts;
 use crate::error::RunErrorKind;
@@ -7,7 +7,7 @@ use crate::motion::Node;
 use std::ops::Index;
 use tfe_runtime::Statistics;
 
-/// How a run came to its end, or why it did not.
+/// The end of a run, or the error that stopped it.
 pub(super) type Outcome<const N: usize, L> = Result<Node<N, L>, RunErrorKind>;
 
 /// The results of an [`Ensemble`](crate::Ensemble), in the order of its starts.

@@ -1,4 +1,4 @@
-//! Why an ensemble could not run at all.
+//! The errors of a whole ensemble.
 
 use crate::error::RunErrorKind;
 use std::error::Error;
@@ -40,7 +40,7 @@ impl fmt::Display for EnsembleError {
 impl Error for EnsembleError {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
-            // Its text is the source's own.
+            // The text is that of the source.
             Self::Run(kind) => kind.source(),
             Self::Starts { .. } => None,
         }

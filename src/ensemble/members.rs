@@ -1,4 +1,4 @@
-//! Whose runs an ensemble makes: those of one model, or of many that differ in their parameters.
+//! The models of an ensemble: one model for all runs, or one for each.
 
 use super::error::EnsembleError;
 use super::plan::{WIDTH, start_of};
@@ -20,23 +20,23 @@ pub trait Models<'m, M>: Copy + Sync + 'm {
 
 /// Models of fixed size, whose runs may go side by side.
 pub trait Members<'m, M: Model<N>, const N: usize>: Models<'m, M> {
-    /// What eight trajectories side by side compute with.
+    /// The type that advances eight trajectories side by side.
     type Lanes: Trajectories<'m, M, N> + Send + Sync + 'm;
 
-    /// Whether runs may go side by side, as far as the models are concerned.
+    /// Whether the models permit runs side by side.
     fn share_kernels(&self) -> bool;
 
-    /// An empty bundle.
+    /// Creates an empty bundle of trajectories.
     ///
     /// # Errors
-    /// [`ElementError`] if the element is none.
+    /// [`ElementError`] if the element does not exist.
     fn bundle(
         &self,
         element: Element,
         control: Control,
     ) -> Result<Bundle<'m, M, N, WIDTH, Self::Lanes>, ElementError>;
 
-    /// Places the runs from `first` on, one a lane.
+    /// Puts the runs from `first` on into the bundle, one per lane.
     fn place(
         &self,
         bundle: &mut Bundle<'m, M, N, WIDTH, Self::Lanes>,
@@ -122,8 +122,9 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for OneModel<'m, 
 impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m, M> {
     type Lanes = Varied<'m, M>;
 
-    /// Kernels written by hand that do not number their parameters read them from one model, which no two lanes share; what has no number, and the functions that inputs come from, are those of one
-    /// model, too.
+    /// Hand-written kernels that do not number their parameters read them from a single model, so lanes with different
+    /// models cannot share them. Parameters without a number, and the functions of inputs, are also those of a single
+    /// model.
     fn share_kernels(&self) -> bool {
         self.0.first().is_some_and(|first| {
             let beside = unnumbered(first);
@@ -150,7 +151,7 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m
     }
 }
 
-/// What kernels of a model read beside its numbered parameters.
+/// The data that the kernels of a model read in addition to its numbered parameters.
 fn unnumbered<M: Model<N>, const N: usize>(model: &M) -> Vec<u64> {
     let mut all = Vec::new();
     model.unnumbered(&mut |value| all.push(value));

@@ -1,4 +1,4 @@
-//! How one batch of an ensemble is run.
+//! Runs one batch of an ensemble.
 
 use crate::error::RunErrorKind;
 use crate::motion::Node;
@@ -8,28 +8,28 @@ use tfe_runtime::bundle::{Bundle, Trajectories};
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{Element, Model, State, Statistics};
 
-/// How many trajectories are stepped side by side.
+/// The number of trajectories that are advanced side by side.
 pub(super) const WIDTH: usize = 8;
 
-/// The start of one run; one alone serves all.
+/// The start of one run; a single start is used for all.
 pub(super) fn start_of<S>(starts: &[S], index: usize) -> &S {
     &starts[if starts.len() == 1 { 0 } else { index }]
 }
 
-/// What all runs have in common.
+/// The data common to all runs.
 pub(super) struct Plan<const N: usize> {
     pub(super) element: Element,
     pub(super) control: Control,
     pub(super) end: f64,
     pub(super) step: f64,
     pub(super) mesh: Mesh<N>,
-    /// Elements of the mesh that are behind.
+    /// The number of elements that are done.
     pub(super) done: usize,
-    /// How many runs are stepped side by side: [`WIDTH`] or one.
+    /// The number of runs that are advanced side by side: [`WIDTH`] or one.
     pub(super) width: usize,
 }
 
-/// Why trajectories in lanes have stopped.
+/// The errors of the trajectories in the lanes.
 pub(super) type Failures = [Option<RunErrorKind>; WIDTH];
 
 impl<const N: usize> Plan<N> {
@@ -37,7 +37,7 @@ impl<const N: usize> Plan<N> {
         Node::new(model, self.end, state, &[0.0; N])
     }
 
-    /// A run over no element.
+    /// The result of a run without elements.
     pub(super) fn at_rest<M: Model<N>>(
         &self,
         model: &M,
@@ -47,7 +47,7 @@ impl<const N: usize> Plan<N> {
         Ok(self.node(model, start))
     }
 
-    /// Up to [`WIDTH`] runs in lanes, from where they are.
+    /// Advances up to [`WIDTH`] runs in lanes, from their current states.
     pub(super) fn drive_together<'m, M, T>(
         &self,
         bundle: &mut Bundle<'m, M, N, WIDTH, T>,
@@ -81,7 +81,7 @@ impl<const N: usize> Plan<N> {
             let result = match (failure, bundle.state(lane)) {
                 (None, Ok(state)) => Ok(self.node(bundle.model_of(lane), &state)),
                 (Some(failure), _) => Err(failure.clone()),
-                // Only a bad start fails outside a step, and it has been found.
+                // Outside of steps only an invalid start causes an error, and starts were checked.
                 (None, Err(source)) => Err(RunErrorKind::Solve {
                     element: 0,
                     time: self.end,
@@ -94,7 +94,7 @@ impl<const N: usize> Plan<N> {
         bundle.take_statistics()
     }
 
-    /// One run by itself.
+    /// Makes one run alone.
     pub(super) fn run_alone<M>(
         &self,
         model: &M,
@@ -112,7 +112,7 @@ impl<const N: usize> Plan<N> {
         (outcome, *stepper.statistics())
     }
 
-    /// A stepper at rest, if the start is good.
+    /// Creates a stepper, if the start is valid.
     pub(super) fn stepper<'m, M>(
         &self,
         model: &'m M,
@@ -128,7 +128,7 @@ impl<const N: usize> Plan<N> {
         Stepper::new(model, self.element, self.control).map_err(RunErrorKind::Element)
     }
 
-    /// One run from where it is.
+    /// Advances one run from its current state.
     pub(super) fn drive_alone<M>(
         &self,
         stepper: &mut Stepper<'_, M, N>,
@@ -150,7 +150,7 @@ impl<const N: usize> Plan<N> {
     }
 }
 
-/// The lanes whose starts are none.
+/// The errors of the lanes with invalid starts.
 pub(super) fn bad_starts<const N: usize>(starts: &[State<N>]) -> Failures {
     let mut failures = [const { None }; WIDTH];
     for (start, failure) in starts.iter().zip(&mut failures) {

@@ -1,4 +1,4 @@
-//! Results of batches, put together.
+//! Collects the results of batches.
 
 use super::doubts::WarningCounts;
 use super::ends::Ends;
@@ -8,7 +8,7 @@ use crate::motion::Node;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tfe_runtime::Statistics;
 
-/// Results as they come, in no particular order.
+/// Results in the order in which they are finished.
 pub(super) struct Results<const N: usize, L: Length<N>> {
     results: Vec<Option<Result<Node<N, L>, RunErrorKind>>>,
     warnings: WarningCounts,
@@ -34,14 +34,14 @@ impl<const N: usize, L: Length<N>> Results<N, L> {
         self.warnings.add(warnings);
     }
 
-    /// When all are there, which are moved within the same memory.
+    /// Converts the complete results to [`Ends`], in the same memory.
     pub(super) fn into_ends(self, statistics: Statistics) -> Ends<N, L> {
         let results = self.results.into_iter().map_while(|result| result);
         Ends::new(results.collect(), statistics, self.warnings)
     }
 }
 
-/// A panic elsewhere leaves what is locked as good as it was.
+/// Locks, also after a panic in another thread: the data remain valid.
 pub(super) fn lock<T>(place: &Mutex<T>) -> MutexGuard<'_, T> {
     place.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -50,7 +50,7 @@ pub(super) fn unlock<T>(place: Mutex<T>) -> T {
     place.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The sum of what all batches have cost. What `place` makes serves many of them, one after the other.
+/// Adds up the work of all batches. A place that `place` creates is used for many of them, one after the other.
 #[cfg(feature = "parallel")]
 pub(super) fn summed<P>(
     batches: usize,

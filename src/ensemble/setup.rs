@@ -1,4 +1,4 @@
-//! Many runs to be, and all of them at once.
+//! The definition of an ensemble, and its runs.
 
 use super::ends::Ends;
 use super::error::EnsembleError;
@@ -227,7 +227,7 @@ where
     M: Model<N> + Sync,
     K: Members<'m, M, N>,
 {
-    /// Whether runs are made one by one, since events or kinks cut their elements.
+    /// Whether runs are made one by one because of events or cuts at kinks.
     pub(super) fn is_watched(&self) -> bool {
         !self.events.is_empty() || (self.at_kinks && const { !M::FACTS.smooth })
     }
@@ -308,7 +308,7 @@ where
         let statistics = if self.is_watched() {
             self.run_one_by_one(starts, &span, (count, &progress), finished)
         } else if plan.width == WIDTH {
-            // Made once, and one batch after the other runs in a copy.
+            // Created once; one batch after the other runs in a copy.
             let empty = self.models.bundle(self.element, self.control);
             let empty = empty.map_err(RunErrorKind::Element)?;
             let batch = |bundle: &mut Bundle<'m, M, N, WIDTH, K::Lanes>, number: usize| {
@@ -340,7 +340,7 @@ where
         Ok(statistics)
     }
 
-    /// How many trajectories are stepped side by side: [`WIDTH`] or one.
+    /// The number of trajectories that are advanced side by side: [`WIDTH`] or one.
     pub(super) fn width(&self) -> usize {
         let uses_lanes = Bundle::<M, N, WIDTH, K::Lanes>::uses_lanes(&self.element, &self.control);
         if uses_lanes && self.models.share_kernels() {

@@ -1,4 +1,4 @@
-//! Ensembles that go on where they have got to.
+//! Ensembles that can be continued.
 
 use super::batch::{AnyBatch, Resumed, Stepped};
 use super::doubts::{Energy, WarningCounts};
@@ -32,9 +32,9 @@ pub struct EnsembleRun<
     ensemble: Ensemble<'m, M, N, K, L>,
     reached: Reached,
     batches: Vec<AnyBatch<'m, M, N, K, L>>,
-    /// How many trajectories each has, but for the last.
+    /// The number of trajectories of each batch except the last.
     width: usize,
-    /// Of each run where it is.
+    /// The energy of each run at its current state.
     energies: Vec<Energy>,
 }
 
@@ -156,7 +156,7 @@ where
     K: Models<'m, M>,
     L: Length<N>,
 {
-    /// Of runs as a [`Simulation`](crate::Simulation) makes them.
+    /// Begins runs that are made one by one by a [`Simulation`](crate::Simulation).
     fn begin_one_by_one(
         &self,
         starts: &[L::State],
@@ -167,7 +167,7 @@ where
         })
     }
 
-    /// Of batches of so many runs, each made by the number of its first and that of all.
+    /// Begins batches of `width` runs; `batch` creates one from the index of its first run and the number of all runs.
     fn begin_with(
         &self,
         starts: &[L::State],
@@ -232,7 +232,7 @@ where
             energies,
         } = self;
         let length = (end - reached.time).abs();
-        // Of the first span that has a length.
+        // The direction of the first span of nonzero length.
         let chosen = (reached.step).or_else(|| (length > 0.0).then_some(length / 1000.0));
         let step = chosen.unwrap_or(0.0);
         let (mesh, done, origin) = reached.place(end, None, |span, _| {

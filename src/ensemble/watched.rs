@@ -1,4 +1,4 @@
-//! Ensembles whose runs look for events, or are cut at kinks.
+//! Ensembles whose runs look for events or are cut at kinks.
 
 use super::doubts::{Energy, WarningCounts};
 use super::ends::Outcome;
@@ -88,7 +88,7 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// One run as a [`Simulation`] makes it, with its events and kinks.
+    /// Makes one run by a [`Simulation`], with its events and kinks.
     fn run_one(
         &self,
         model: &'m M,
@@ -103,7 +103,7 @@ where
         outcome(model, &run.run(start.clone(), span.clone()))
     }
 
-    /// A run with the settings of the ensemble.
+    /// A simulation with the settings of the ensemble.
     pub(super) fn simulation(&self, model: &'m M, step: f64) -> Simulation<'m, M, N, L>
     where
         M: Declared<N, Length = L>,
@@ -119,7 +119,7 @@ where
         breaks.fold(run, |run, time| run.break_at(*time))
     }
 
-    /// How many runs that came to their ends are doubtful: of one.
+    /// The warnings of one run that reached its end.
     pub(super) fn doubts(
         &self,
         model: &M,
@@ -137,14 +137,14 @@ where
         )
     }
 
-    /// Whether energies should stay what they are, which events may change.
+    /// Whether energies should be conserved; events may change them.
     pub(super) fn conserves(&self) -> bool {
         M::CONSERVES && self.events.is_empty()
     }
 }
 
-/// How a run came to its end, and what it has cost. The velocity there is looked for from rest, as trajectories side by side look for theirs, and not from another node: the same bits in
-/// whatever parts a run is made.
+/// The end of a run and its work. The velocity at the end is found by iteration from zero, as for trajectories side by
+/// side, not from that of another node: the result does not depend, to the bit, on how the run is divided.
 pub(super) fn outcome<M, const N: usize, L>(
     model: &M,
     run: &Result<Motion<N, L>, RunError<N, L>>,
@@ -159,7 +159,7 @@ where
     };
     let last = motion.last();
     let from_rest = || Node::new(model, last.t, &last.state(), &L::zero(&last.q));
-    // Parameters that events have set are not those of the model.
+    // The parameters that events have set differ from those of the model.
     let is_unchanged = motion.settings().is_empty();
     let node = is_unchanged.then(from_rest).filter(|node| {
         let mut velocity = node.v.as_ref().iter();

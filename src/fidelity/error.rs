@@ -1,4 +1,4 @@
-//! Why models could not be compared.
+//! The errors of model comparisons.
 
 use crate::error::RunErrorKind;
 use std::error::Error;
@@ -126,7 +126,7 @@ fn no_outputs(f: &mut fmt::Formatter<'_>, declared: &[(String, Vec<String>)]) ->
     f.write_str("; declare what matters in each by `output(name) = …`, under one name")
 }
 
-/// Names as a sentence has them.
+/// Names as a list in a sentence.
 fn list(names: &[String]) -> String {
     if names.is_empty() {
         return "none".to_owned();

@@ -1,4 +1,4 @@
-//! What was found of each model, and which is chosen.
+//! The result of a model comparison: the runs of each model and the choices.
 
 use crate::error::RunErrorKind;
 use crate::work_precision::measurements::pareto;

@@ -1,4 +1,4 @@
-//! Ladders as text, tables and files.
+//! Results of model comparisons as text, tables and files.
 
 use super::ladder::{Choice, Ladder, Rung, RungPoint};
 #[cfg(feature = "charts")]
@@ -39,7 +39,7 @@ impl Ladder {
         text
     }
 
-    /// What is chosen for an accuracy: rung, element, step, error, time; or why nothing is.
+    /// The choice for an accuracy: rung, element, step, error, time; or why there is none.
     fn row(&self, accuracy: f64) -> [String; 6] {
         let asked = format!("{:e}", rounded(accuracy));
         match self.cheapest(accuracy) {
@@ -65,7 +65,7 @@ impl Ladder {
 }
 
 impl fmt::Display for Ladder {
-    /// A line for each accuracy, then the errors of the models and the reference.
+    /// Writes a line for each accuracy, then the errors of the models and of the reference.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut rows = vec![HEADINGS.map(str::to_owned)];
         rows.extend(self.accuracies.iter().map(|accuracy| self.row(*accuracy)));
@@ -93,7 +93,7 @@ impl fmt::Display for Ladder {
 
 const HEADINGS: [&str; 6] = ["accuracy", "rung", "element", "step", "error", "time"];
 
-/// Seconds in a unit that makes them a short number.
+/// Seconds, in a unit in which they are a short number.
 fn time(seconds: f64) -> String {
     if seconds >= 1.0 {
         format!("{seconds:.2} s")
@@ -104,7 +104,7 @@ fn time(seconds: f64) -> String {
     }
 }
 
-/// To four digits.
+/// Rounds to four digits.
 fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }

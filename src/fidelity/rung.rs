@@ -1,4 +1,4 @@
-//! One model of the scene, whatever its type.
+//! One rung: a model of the system, behind an interface without its type.
 
 use crate::error::RunErrorKind;
 use crate::work_precision::grid::Grid;
@@ -13,37 +13,37 @@ pub(super) struct Scene<'m, M, S> {
     pub(super) start: S,
 }
 
-/// Which outputs of a run are looked at, and when.
+/// The outputs that are recorded in a run, and when.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outputs<'c> {
-    /// Their columns among those of the model.
+    /// Their columns among the outputs of the model.
     pub(super) columns: &'c [usize],
-    /// The number of equal parts of the span; every grid has a whole number of steps in each.
+    /// The number of equal parts of the span; every mesh has a whole number of steps in each.
     pub(super) parts: usize,
 }
 
-/// What was seen of a run.
+/// The record of a run.
 #[derive(Clone, Debug)]
 pub(super) struct Seen {
     /// A row at the start, and one at the end of each part.
     pub(super) rows: Vec<Vec<f64>>,
-    /// What the steps took.
+    /// The computing time of the steps.
     pub(super) time: Duration,
     pub(super) statistics: Statistics,
 }
 
-/// What is asked of a model, with its type forgotten. What is timed knows the type.
+/// The interface of a rung. The timed loop itself is compiled for the type of the model.
 pub(super) trait Runs {
     /// The names of the outputs.
     fn names(&self) -> Result<Vec<String>, RunErrorKind>;
 
-    /// Refuses a start from which no run begins.
+    /// Refuses a start at which no run can begin.
     fn check_start(&self, grid: &Grid) -> Result<(), RunErrorKind>;
 
-    /// Makes the run, with the clock stopped while it is looked at.
+    /// Makes a run and records it; the clock is stopped while outputs are evaluated.
     fn look(&self, way: Way<'_>, outputs: Outputs<'_>) -> Result<Seen, RunErrorKind>;
 
-    /// Makes the run without looking.
+    /// Makes a run without recording it.
     fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind>;
 }
 

@@ -1,4 +1,4 @@
-//! The runs of one rung: steps halved until errors fall no more, then times.
+//! The runs of one rung: steps are halved until the error no longer decreases, then runs are repeated for timing.
 
 use super::ladder::{Choice, Rung, RungPoint};
 use super::rung::{Outputs, Runs, Seen};
@@ -18,24 +18,24 @@ pub(super) struct Search<'a> {
     trials: Vec<Trial<'a>>,
 }
 
-/// A run, which may be repeated.
+/// A run that can be repeated.
 struct Trial<'a> {
     way: Way<'a>,
     outcome: Result<Found, RunErrorKind>,
     spent: Duration,
 }
 
-/// What was found of a run that reached its end.
+/// The result of a run that reached its end.
 struct Found {
     seen: Seen,
     error: f64,
-    /// The distance from the run with twice the step; infinite where there is none, or it tells nothing.
+    /// The distance from the run with twice the step; infinite if there is none, or if the comparison is meaningless.
     change: f64,
     seconds: f64,
     repetitions: u32,
 }
 
-/// An error is the model's where twice the step changes the run by less than this part of it.
+/// The error of a run is that of the model if doubling the step changes the run by less than this fraction of it.
 const SETTLED: f64 = 0.5;
 
 impl<'a> Search<'a> {
@@ -48,7 +48,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Runs with one element and shorter and shorter steps, until there is no point in shorter ones.
+    /// Makes runs with one element and decreasing steps, until shorter ones are not useful.
     pub(super) fn halve(&mut self, element: Element, grids: &'a [Grid], smallest: f64) {
         let mut end = End::new(smallest);
         let mut last = None;
@@ -86,7 +86,8 @@ impl<'a> Search<'a> {
     }
 
     fn found(&self, seen: Seen, last: Option<Vec<Vec<f64>>>) -> Found {
-        // Steps that were cut have the pieces that those of twice the length have, and agree with them whatever they are off by.
+        // Steps that were cut may have the same pieces as those of twice the length; the runs then agree whatever their
+        // error.
         let last = last.filter(|_| seen.statistics.cuts == 0);
         Found {
             error: self.truth.error(&seen.rows),
@@ -97,7 +98,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Repeats all runs, each until it has taken `until` in all.
+    /// Repeats all runs, each until it has taken the time `until` in total.
     pub(super) fn repeat(&mut self, until: Duration) {
         for trial in &mut self.trials {
             let Ok(found) = &mut trial.outcome else {
@@ -108,12 +109,12 @@ impl<'a> Search<'a> {
                 repetitions: &mut found.repetitions,
                 spent: &mut trial.spent,
             };
-            // It has run before, from the same start.
+            // The same run succeeded before.
             best.repeat(until, || self.rung.time(trial.way).ok());
         }
     }
 
-    /// The error that no element and no step makes smaller: that of the run which twice the step changes least.
+    /// The error that no element and no step reduces: that of the run which changes least if its step is doubled.
     fn model_error(&self) -> Option<f64> {
         let found = self
             .trials
@@ -124,8 +125,9 @@ impl<'a> Search<'a> {
         least.map(|one| one.error)
     }
 
-    /// With errors that are no smaller than that of the model (where numerical errors happen to cancel it, that is luck), nor than what the truth is known to.
-    /// What is below the smallest accuracy is not told from roundings, and no error of the model.
+    /// Raises the errors to at least that of the model (a smaller one is due to chance cancellation by numerical
+    /// errors) and the uncertainty of the reference. A model error below the smallest accuracy cannot be distinguished
+    /// from rounding errors, and is dropped.
     pub(super) fn into_rung(self, name: &str, is_truth: bool, smallest: f64) -> Rung {
         let floor = self.model_error().filter(|_| !is_truth);
         let least = self.truth.summary().uncertainty();
@@ -158,12 +160,12 @@ impl<'a> Search<'a> {
     }
 }
 
-/// `f64::max` would drop a NaN.
+/// `f64::max` would ignore a NaN.
 fn at_least(error: f64, least: f64) -> f64 {
     if error < least { least } else { error }
 }
 
-/// Whether a run fails for a reason that no step changes.
+/// Whether a run fails for a reason that does not depend on the step.
 fn is_of_every_step(kind: &RunErrorKind) -> bool {
     matches!(
         kind,
@@ -174,14 +176,14 @@ fn is_of_every_step(kind: &RunErrorKind) -> bool {
     )
 }
 
-/// When shorter steps have no use.
+/// Detects when shorter steps are not useful.
 struct End {
     /// The smallest accuracy that is asked for.
     smallest: f64,
     before: Option<f64>,
-    /// How many runs in a row have not lowered the error.
+    /// The number of successive runs that have not reduced the error.
     flat: u32,
-    /// How many runs in a row were good enough.
+    /// The number of successive runs that were accurate enough.
     enough: u32,
 }
 
@@ -195,17 +197,18 @@ impl End {
         }
     }
 
-    /// After a run that failed.
+    /// Called after a run that failed.
     fn forget(&mut self) {
         (self.before, self.flat, self.enough) = (None, 0, 0);
     }
 
-    /// After a run: whether twice in a row the error did not fall by 30 %, or was small enough. One that does not fall because no step is short
-    /// enough yet still changes with the step, and counts for nothing.
+    /// Called after a run: whether in two successive runs the error did not decrease by 30 %, or was small enough. A
+    /// run whose error does not decrease because steps are still too long is recognised by its large change, and not
+    /// counted.
     fn is_reached(&mut self, found: &Found) -> bool {
-        /// What a halved step must make of the error at most.
+        /// The largest ratio of successive errors that counts as a decrease.
         const FALLS: f64 = 0.7;
-        /// Below it, errors that do not fall are roundings.
+        /// Below this, errors that do not decrease are rounding errors.
         const RESOLVED: f64 = 1e-6;
         let error = found.error;
         let is_resolved = found.change <= SETTLED * error || error < RESOLVED;

@@ -1,4 +1,4 @@
-//! What the outputs of all runs are compared with.
+//! The reference with which the outputs of all runs are compared.
 
 use super::error::FidelityError;
 use super::rung::{Outputs, Runs};
@@ -14,13 +14,14 @@ use tfe_runtime::{Element, Mixed};
 pub(super) struct Truth {
     /// A row at the start, and one at the end of each part.
     rows: Vec<Vec<f64>>,
-    /// The largest |y| of each output; one where all are zero.
+    /// The largest |y| of each output; one if all are zero.
     scales: Vec<f64>,
     summary: Reference,
 }
 
 impl Truth {
-    /// A run whose step is halved until two agree to a tenth of the smallest accuracy, or approach no more.
+    /// Makes runs of the last rung, halving the step until two agree to a tenth of the smallest accuracy, or no longer
+    /// approach each other.
     pub(super) fn find(
         rung: &dyn Runs,
         outputs: Outputs<'_>,
@@ -34,14 +35,14 @@ impl Truth {
         rung.check_start(fine).map_err(FidelityError::Reference)?;
         let halving = Halving {
             longest: coarse.step(),
-            // One more than other runs have, and two runs at least.
+            // One step size more than the other runs have, but at least two runs.
             least: fine.step() / 2.0 * 0.75,
             enough: (0.1 * smallest).max(f64::EPSILON),
         };
         let run = |halvings: u32| {
             let step = coarse.step() * 0.5_f64.powi(halvings as i32);
             let grid = Grid::new(span, step);
-            // Half the step of a grid that there is.
+            // Half the step of an existing mesh.
             let grid = &grid.unwrap_or_else(|_| fine.clone());
             let way = Way {
                 element,
@@ -84,7 +85,7 @@ impl Truth {
     }
 }
 
-/// The largest |y| of each output; one where all are zero.
+/// The largest |y| of each output; one if all are zero.
 fn scales_of(rows: &[Vec<f64>]) -> Vec<f64> {
     let count = rows.first().map_or(0, Vec::len);
     let mut scales = vec![0.0; count];
@@ -101,7 +102,7 @@ fn scales_of(rows: &[Vec<f64>]) -> Vec<f64> {
     scales
 }
 
-/// max |a − b| / scale; NaN where one of them is.
+/// max |a − b| / scale; NaN if a number is NaN.
 fn distance(a: &[Vec<f64>], b: &[Vec<f64>], scales: &[f64]) -> f64 {
     let mut most = 0.0;
     for (a, b) in a.iter().zip(b) {

@@ -1,9 +1,9 @@
-//! What was measured.
+//! Measured data.
 
 use super::error::FitError;
 use tfe_runtime::Model;
 
-/// Values of one output, as given.
+/// The measured values of one output, as given.
 #[derive(Clone, Debug)]
 pub(super) struct Measured {
     pub(super) name: String,
@@ -12,7 +12,7 @@ pub(super) struct Measured {
     pub(super) deviation: f64,
 }
 
-/// The same of a model that has such an output.
+/// The same values, with the output resolved in the model.
 #[derive(Debug)]
 pub(super) struct Column<'a> {
     pub(super) place: Observed,
@@ -21,10 +21,10 @@ pub(super) struct Column<'a> {
     pub(super) deviation: f64,
 }
 
-/// What is observed of a motion.
+/// The quantity of a motion that was measured.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Observed {
-    /// An output, by its place.
+    /// An output, by its index.
     Output(usize),
     /// A coordinate.
     Coordinate(usize),

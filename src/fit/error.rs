@@ -1,4 +1,4 @@
-//! Why parameters are not found.
+//! The errors of parameter identification.
 
 use crate::error::RunErrorKind;
 use std::error::Error;

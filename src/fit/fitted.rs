@@ -1,4 +1,4 @@
-//! What a fit has found.
+//! The result of a fit.
 
 use crate::motion::Motion;
 use crate::numbers::{digits, norm};
@@ -95,7 +95,7 @@ impl<M, const N: usize> Fitted<M, N> {
     }
 }
 
-/// A line for each unknown: first value, value, deviation; then the deviation of the measurements.
+/// A line for each unknown: first value, value, standard deviation; then the deviation of the measurements.
 impl<M, const N: usize> fmt::Display for Fitted<M, N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let widest = self.names.iter().map(String::len).max().unwrap_or(0);

@@ -1,4 +1,5 @@
-//! The least-squares problem of a fit, as the library that solves it wants it; of no model, so that it is compiled once.
+//! The least-squares problem of a fit, for the solver library; independent of the type of the model, so that it is
+//! compiled only once.
 
 use super::error::FitError;
 use super::fitted::Trial;
@@ -7,31 +8,31 @@ use crate::numbers::{digits, largest, norm};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::{DMatrix, DVector, Dyn, U1, VecStorage};
 
-/// Residuals and their derivatives as functions of the unknowns.
+/// Computes residuals and their derivatives from the unknowns.
 pub(super) trait Compare {
-    /// Those of some values; always as many.
+    /// The residuals for given unknowns; their number is always the same.
     ///
     /// # Errors
-    /// Why there are none.
+    /// Why they cannot be computed.
     fn compare(&mut self, values: &[f64]) -> Result<Compared, FitError>;
 }
 
-/// What was measured beside a motion.
+/// The measured values compared with a motion.
 pub(super) struct Compared {
     pub(super) residuals: Vec<f64>,
-    /// By the values, a row for each residual.
+    /// The derivatives by the unknowns, a row for each residual.
     pub(super) slopes: DMatrix<f64>,
 }
 
 impl Compared {
-    /// Whether no unknown alone makes the sum of squares less: the residuals are perpendicular to their derivatives.
+    /// Whether no unknown alone reduces the sum of squares: the residuals are orthogonal to their derivatives.
     fn is_stationary(&self) -> bool {
-        /// Of the cosine, far above what noise leaves at a least sum.
+        /// The largest cosine of the angle between them; far above the effect of noise at a minimum.
         const PERPENDICULAR: f64 = 1e-4;
 
         let unit = |numbers: &[f64]| {
             let size = norm(numbers);
-            // Products of numbers of any size vanish or overflow, of their parts they do not.
+            // Both vectors are normalised first, since their product may overflow or underflow.
             DVector::from_iterator(
                 numbers.len(),
                 numbers
@@ -44,9 +45,10 @@ impl Compared {
         columns.all(|column| unit(column.as_slice()).dot(&residuals).abs() <= PERPENDICULAR)
     }
 
-    /// s² (JᵀJ)⁻¹ (T-126), and the roots of its diagonal, whose squares may be less than any number.
+    /// The covariance matrix s² (JᵀJ)⁻¹ (T-126), and the square roots of its diagonal, whose squares may underflow.
     fn covariance(&self, names: &[String]) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
-        /// Singular values below this part of the largest, of columns of length one, are roundings of the motion.
+        /// Singular values below this, relative to the largest and for columns normalised to one, are due to rounding
+        /// errors of the motion.
         const TOLD: f64 = 1e-11;
 
         let mut slopes = self.slopes.clone();
@@ -70,7 +72,7 @@ impl Compared {
         if svd.singular_values[least] < TOLD * largest {
             return Err(undetermined(right.row(least).iamax_full().1));
         }
-        // s
+        // The standard deviation s.
         let deviation = match rows - columns {
             0 => 1.0,
             free => norm(&self.residuals) / (free as f64).sqrt(),
@@ -88,26 +90,27 @@ impl Compared {
     }
 }
 
-/// Residuals as functions of numbers without bounds, at the last ones that were tried.
+/// The residuals as functions of unbounded variables, at the last trial.
 pub(super) struct Least<'r> {
     runs: &'r mut dyn Compare,
     unknowns: &'r Unknowns,
     shows: bool,
     numbers: DVector<f64>,
-    /// None where the run failed.
+    /// `None` if the run failed.
     here: Option<Compared>,
-    /// Why the last trial that failed has.
+    /// The error of the last trial that failed.
     failure: Option<FitError>,
-    /// Of residuals.
+    /// The number of residuals.
     count: usize,
     trials: Vec<Trial>,
-    /// A power of two near the largest residual at the beginning: the library that solves the problem forms squares, of units in which they neither vanish nor overflow.
+    /// A power of two close to the largest initial residual. The solver forms squares, which in this unit neither
+    /// overflow nor underflow.
     unit: f64,
-    /// The sum of squares at the beginning, in this unit.
+    /// The initial sum of squares, in this unit.
     first: f64,
 }
 
-/// What has come of it.
+/// The result of the iteration.
 pub(super) struct Solved {
     pub(super) values: Vec<f64>,
     pub(super) covariance: DMatrix<f64>,
@@ -144,16 +147,17 @@ impl<'r> Least<'r> {
     }
 
     pub(super) fn solve(self) -> Result<Solved, FitError> {
-        /// Relative changes of the sum of squares and of the unknowns that end the iteration: far below what noise does to them.
+        /// The relative changes of the sum of squares and of the unknowns at which the iteration ends; far below the
+        /// effect of noise.
         const TOLERANCE: f64 = 1e-12;
-        /// Those that decide at the end, and the run that is gone back to.
+        /// The number of trials that decide at the end, including the run to which the iteration returns.
         const LAST_TRIALS: usize = 3;
 
         let method = LevenbergMarquardt::new()
             .with_ftol(TOLERANCE)
             .with_xtol(TOLERANCE)
             .with_gtol(TOLERANCE)
-            // First steps of the size of the unknowns, not a hundred times as long.
+            // The first steps are of the size of the unknowns, not the default of a hundred times that.
             .with_stepbound(1.0);
         let (done, report) = method.minimize(self);
         use TerminationReason::{Converged, NoImprovementPossible, Orthogonal, ResidualsZero};
@@ -171,7 +175,7 @@ impl<'r> Least<'r> {
             reason,
             ResidualsZero | Orthogonal | Converged { .. } | NoImprovementPossible(_)
         );
-        // Steps that became short because trials failed, not because there is nothing to gain.
+        // The steps became short because trials failed, not because a minimum was reached.
         let failure = failure.filter(|_| {
             let mut last = trials.iter().rev().take(LAST_TRIALS);
             last.any(|one| one.deviation.is_infinite())
@@ -204,7 +208,7 @@ impl<'r> Least<'r> {
         })
     }
 
-    /// A run with the current numbers.
+    /// Compares a run at the current variables with the measurements.
     fn compare(&mut self) -> Result<Compared, FitError> {
         let (values, _) = self.unknowns.values(self.numbers.as_slice());
         let compared = self.runs.compare(&values)?;
@@ -216,7 +220,7 @@ impl<'r> Least<'r> {
         }
     }
 
-    /// Keeps the trial, and shows it.
+    /// Records the trial, and shows it.
     fn note(&mut self) {
         let (values, _) = self.unknowns.values(self.numbers.as_slice());
         let deviation = self.here.as_ref().map_or(f64::INFINITY, |one| {
@@ -237,11 +241,11 @@ impl<'r> Least<'r> {
     }
 }
 
-/// A power of two near the largest residual; near the largest slope where all residuals are zero.
+/// A power of two close to the largest residual; close to the largest derivative if all residuals are zero.
 fn unit_of(start: &Compared) -> f64 {
     let sizes = [&start.residuals[..], start.slopes.as_slice()].map(largest);
     let size = sizes.into_iter().find(|size| *size > 0.0);
-    // Neither it nor what is divided by it is beyond what a number can be.
+    // Neither the unit nor numbers divided by it may overflow.
     let exponent = size.unwrap_or(1.0).log2().round().clamp(-1000.0, 1000.0);
     exponent.exp2()
 }
@@ -270,7 +274,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Least<'_> {
         self.numbers.clone()
     }
 
-    /// Where the run fails they are so large that the trial is refused.
+    /// If the run fails, residuals so large that the trial is refused.
     fn residuals(&self) -> Option<DVector<f64>> {
         Some(match &self.here {
             Some(here) => DVector::from_column_slice(&here.residuals) / self.unit,

@@ -1,4 +1,4 @@
-//! Runs with values of the unknowns, beside what was measured.
+//! Runs with trial values of the unknowns, compared with the measurements.
 
 use super::data::{Column, Observed};
 use super::error::FitError;
@@ -11,16 +11,16 @@ use nalgebra::DMatrix;
 use std::ops::Range;
 use tfe_runtime::{Model, State};
 
-/// The runs of a fit.
+/// Makes the runs of a fit.
 pub(super) struct Runs<'f, M, const N: usize> {
     fit: &'f Fit<'f, M, N>,
     columns: Vec<Column<'f>>,
     unknowns: &'f Unknowns,
-    /// Where it is not looked for.
+    /// The start, if it is not among the unknowns.
     start: Option<State<N>>,
     span: Range<f64>,
     times: Vec<f64>,
-    /// That of the last values.
+    /// The run with the last values.
     last: Option<Sensitive<N>>,
 }
 
@@ -34,7 +34,7 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
         let measured = || columns.iter().flat_map(|one| one.times).copied();
         let known = [&fit.breaks[..], &[t0]].concat();
         let times = looked_at(measured(), &known);
-        // Of a last one that can be no node the one beside it.
+        // If the last time cannot be a node, the adjacent number is used.
         let latest = measured().fold(t0, f64::max);
         let last = known.into_iter().find(|one| is_unresolved(*one, latest));
         let last = last.or(times.last().copied()).unwrap_or(t0);
@@ -49,7 +49,7 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
         }
     }
 
-    /// The model with these values.
+    /// The model with given values of the unknowns.
     pub(super) fn model(&self, values: &[f64]) -> Result<M, FitError> {
         let model = self.fit.model;
         let mut made = None;
@@ -62,7 +62,7 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
         }
         match made {
             Some(made) => Ok(made),
-            // Only the start is looked for: a copy, by way of any parameter.
+            // If only the start is unknown, the model is copied by setting any parameter to its own value.
             None => model
                 .with_parameter(0, model.parameter(0))
                 .ok_or(FitError::NotCopied),
@@ -74,7 +74,7 @@ impl<'f, M: Model<N>, const N: usize> Runs<'f, M, N> {
         self.last.as_ref().map(Sensitive::motion)
     }
 
-    /// The start of a run with these values.
+    /// The start of a run with given values of the unknowns.
     fn start(&self, values: &[f64]) -> State<N> {
         let own = &values[self.unknowns.parameters.len()..];
         self.start.unwrap_or_else(|| State {
@@ -95,7 +95,7 @@ impl<M: Model<N>, const N: usize> Compare for Runs<'_, M, N> {
         let motion = sensitive.motion();
         for column in &self.columns {
             for (t, measured) in column.times.iter().zip(column.values) {
-                // Elements end there.
+                // Elements end at the measured times.
                 let node = motion.nearest(*t);
                 let (value, by_parameters, by_start) = match column.place {
                     Observed::Output(place) => sensitive.output_at(node, place),

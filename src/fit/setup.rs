@@ -1,4 +1,4 @@
-//! A fit to be: the model, what is looked for, what was measured.
+//! The definition of a fit: the model, the unknowns and the measurements.
 
 use super::data::{Column, Measured};
 use super::error::FitError;
@@ -63,7 +63,7 @@ pub struct Fit<'m, M, const N: usize> {
     pub(super) progress: bool,
 }
 
-/// What is known of the start.
+/// What is known about the start.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Start<const N: usize> {
     Known(State<N>, f64),
@@ -184,7 +184,7 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         self
     }
 
-    /// What was measured, with the places of outputs.
+    /// The measurements, with the indices of their outputs.
     pub(super) fn columns(&self) -> Result<Vec<Column<'_>>, FitError> {
         if self.measured.is_empty() {
             return Err(FitError::NothingMeasured);
@@ -195,7 +195,7 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
             .collect()
     }
 
-    /// Time and state at the start, and whether it is known.
+    /// The time and the state at the start, and whether the state is known.
     pub(super) fn first(&self, columns: &[Column<'_>]) -> Result<(f64, State<N>, bool), FitError> {
         let times = || columns.iter().flat_map(|one| one.times);
         let earliest = times().copied().fold(f64::INFINITY, f64::min);
@@ -222,7 +222,7 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         Ok((t0, state, is_known))
     }
 
-    /// The run of a model over the measurements.
+    /// A run of a model over the times of the measurements.
     pub(super) fn simulation<'s>(&self, model: &'s M, times: &[f64]) -> Simulation<'s, M, N> {
         let mut simulation = Simulation::new(model);
         if let Some(element) = self.element {

@@ -38,7 +38,7 @@ impl<M: Model<N>, const N: usize> Fit<'_, M, N> {
             residuals,
             trials,
         } = solved;
-        // The last run is that of the values found.
+        // The last run is the one with the fitted values.
         let motion = runs.motion().cloned().ok_or(FitError::NotFinite)?;
         let model = runs.model(&values)?;
         Ok(Fitted {

@@ -1,29 +1,30 @@
-//! What a fit looks for.
+//! The unknowns of a fit, and their transformation to unbounded variables.
 
 use super::error::FitError;
 use std::f64::consts::FRAC_PI_2;
 use tfe_runtime::{Model, State};
 
-/// What is looked for: parameters, then the numbers of the start, ordered (p, q).
+/// The unknowns: parameters, then the components of the start in the order (p, q).
 #[derive(Clone, Debug)]
 pub(super) struct Unknowns {
     pub(super) names: Vec<String>,
-    /// The parameters, by their index among all of the model.
+    /// The indices of the parameters in the model.
     pub(super) parameters: Vec<usize>,
     ways: Vec<Way>,
     /// The first values.
     pub(super) first: Vec<f64>,
 }
 
-/// How a value with bounds x follows from a number without, u: x = ±X, whose lower bound is the nearer one to zero. It is counted from zero where that is between the bounds, so that small values
-/// keep their digits between wide ones.
+/// The transformation from an unbounded variable u to a value x with bounds: x = ±X, with the sign such that the lower
+/// bound of X is the one closer to zero. If zero lies between the bounds, X is measured from zero, so that small values
+/// keep their digits even between distant bounds.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// One, or minus one where the upper bound is nearer to zero.
+    /// 1, or −1 if the upper bound is closer to zero.
     sign: f64,
     low: f64,
     high: f64,
-    /// X where u is zero: the lower bound, or zero.
+    /// X at u = 0: the lower bound, or zero.
     origin: f64,
     shape: Shape,
 }
@@ -40,7 +41,7 @@ enum Shape {
 }
 
 impl Way {
-    /// That of a value without bounds.
+    /// The transformation of a value without bounds.
     const FREE: Self = Self {
         sign: 1.0,
         low: f64::NEG_INFINITY,
@@ -50,7 +51,7 @@ impl Way {
     };
 
     fn new(low: f64, high: f64, value: f64) -> Self {
-        // No number is beyond the largest.
+        // A bound at the largest finite number is no restriction.
         let bounds = [-low, high].map(|end| if end < f64::MAX { end } else { f64::INFINITY });
         let [low, high] = [-bounds[0], bounds[1]];
         if low.is_infinite() && high.is_infinite() {
@@ -64,7 +65,7 @@ impl Way {
         let shape = match high.is_finite() {
             true => Shape::Between {
                 width: high - low,
-                // Zero is a part sin² of the way, where it is between the bounds.
+                // The position of zero between the bounds is sin² shift.
                 shift: (origin - low).sqrt().atan2((high - origin).sqrt()),
             },
             false => {
@@ -88,13 +89,13 @@ impl Way {
         }
     }
 
-    /// x and dx/du.
+    /// The value x and its derivative dx/du.
     fn value(self, u: f64) -> (f64, f64) {
         let (more, rate) = match self.shape {
             Shape::Free => return (u, 1.0),
             Shape::Beyond { unit, shift } => {
                 let (root, first) = ((u + shift).hypot(1.0), shift.hypot(1.0));
-                // The difference of the roots, with all digits where u is small.
+                // The difference of the roots, written without cancellation for small u.
                 let difference = u * ((u + 2.0 * shift) / (root + first));
                 (unit * difference, unit * (u + shift) / root)
             }
@@ -107,7 +108,7 @@ impl Way {
         (self.sign * value, self.sign * rate)
     }
 
-    /// u of x; where x is a bound it does not move with u, which is then a little inside.
+    /// The variable u of a value x. At a bound dx/du would vanish, so u is moved slightly inside.
     fn number(self, x: f64) -> f64 {
         const INSIDE: f64 = 1e-2;
 
@@ -162,7 +163,7 @@ impl Unknowns {
             }
             let own = bounds.iter().rev().find(|(own, ..)| own == name);
             let (low, high) = own.map_or((f64::NEG_INFINITY, f64::INFINITY), |one| (one.1, one.2));
-            // Of a value that is NaN the first run tells.
+            // A NaN is reported by the first run.
             let is_within = value.is_nan() || (low..=high).contains(&value);
             if !(low < high && is_within) {
                 return Err(FitError::Bounds {
@@ -210,13 +211,13 @@ impl Unknowns {
         self.names.len()
     }
 
-    /// The values of numbers without bounds, and their rates.
+    /// The values for given unbounded variables, and their derivatives.
     pub(super) fn values(&self, numbers: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let ways = self.ways.iter().zip(numbers);
         ways.map(|(way, u)| way.value(*u)).unzip()
     }
 
-    /// Numbers without bounds for the first values.
+    /// The unbounded variables of the first values.
     pub(super) fn numbers(&self) -> Vec<f64> {
         let ways = self.ways.iter().zip(&self.first);
         ways.map(|(way, x)| way.number(*x)).collect()

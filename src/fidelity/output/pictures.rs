@@ -1,10 +1,10 @@
-//! Charts and sections of pages.
+//! Charts and sections of pages for model comparisons.
 
 use super::HEADINGS;
 use crate::charts::{Axis, Chart, ChartError, Scale, Section, Style};
 use crate::fidelity::{Choice, Ladder, Rung};
 
-/// Runs further off have lost the motion, and are not drawn.
+/// Runs with a larger error have lost the motion, and are not drawn.
 const LOST: f64 = 10.0;
 
 impl Ladder {
@@ -31,7 +31,7 @@ impl Ladder {
             let ends = |error| [(error, least), (error, most)];
             let errors = self.rungs.iter().filter_map(|rung| rung.model_error);
             let drawn = errors.filter(|error| *error < LOST);
-            // One line of the legend for all, which look the same.
+            // One legend entry for all, since they look the same.
             let names = std::iter::once("errors of models").chain(std::iter::repeat(""));
             for (error, name) in drawn.zip(names) {
                 chart = chart.series(name, Style::Reference, ends(error));
@@ -40,7 +40,7 @@ impl Ladder {
         chart
     }
 
-    /// Error and cost of the front of a rung.
+    /// The errors and costs of the most efficient runs (Pareto front) of a rung.
     fn places(&self, rung: &Rung) -> Vec<(f64, f64)> {
         let place = |one: &Choice| (one.error, one.cost(self.cost));
         let front = rung.front(self.cost);
