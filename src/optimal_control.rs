@@ -1,5 +1,4 @@
-//! Optimal control: the inputs of least cost over a span of time, by direct transcription with the elements of the
-//! model.
+//! Optimal control: the inputs of least cost over a time span, by direct transcription with the elements of the model.
 
 mod block;
 mod condensed;
@@ -91,7 +90,7 @@ pub struct OptimalControl<'m, M, const N: usize> {
     control: Control,
 }
 
-/// A function of the time.
+/// A function of time.
 type Source<'m> = Box<dyn Fn(f64) -> f64 + 'm>;
 
 impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
@@ -336,7 +335,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         Ok(())
     }
 
-    /// The columns of outputs.
+    /// The columns of the outputs that are costs.
     fn columns(&self, names: &[String]) -> Result<Vec<usize>, OptimalControlErrorKind> {
         let columns = 0..self.model.columns();
         let find = |name: &String| {
@@ -353,7 +352,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         names.iter().map(find).collect()
     }
 
-    /// Costs of the end do not depend on inputs, which have no value there of their own.
+    /// Refuses a cost of the end that depends on an input: inputs have no value of their own there.
     fn check_end(&self, columns: &[usize]) -> Result<(), OptimalControlErrorKind> {
         for input in 0..M::INPUTS.len() {
             let holding = dependence::holding::<M, N>(self.model, input);
@@ -386,7 +385,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         ends
     }
 
-    /// The guess, on the elements; what is given of the ends is met.
+    /// The first iterate on the mesh, from the guess; prescribed components at the ends are satisfied.
     fn first(
         &self,
         table: &SchemeTable,
@@ -424,7 +423,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
             let mut steering = DVector::zeros(sizes.steering());
             for (name, function) in &self.inputs {
                 let input = place(M::INPUTS, name)?;
-                // ∫ P_k u over ∫ P_k².
+                // The coefficient of P_k: ∫ P_k u divided by ∫ P_k².
                 let mut basis = [0.0; MAX_NODES];
                 for (at, weight) in scheme.nodes.iter().zip(scheme.weights) {
                     legendre(*at, &mut basis);

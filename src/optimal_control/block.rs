@@ -1,4 +1,4 @@
-//! Blocks of equations that are affine in what a model says at points, with first and second derivatives.
+//! Blocks of equations that are affine in the model functions at quadrature points, with first and second derivatives.
 //!
 //! With the variables s = (x, w) of a block, (q, z, u)_l = P_l s at its points and g = (momentum or velocity, force) there,
 //!
@@ -6,50 +6,51 @@
 //! c(s) = L s + Σ_l W_l g(P_l s) ,     f(s) = Σ_l w_l ℓ(P_l s) .
 //! ```
 //!
-//! Derivatives of g and ℓ at a point are those of the kernels, evaluated with dual numbers over dual numbers; all else is linear.
+//! Derivatives of g and ℓ at a point are computed by the kernels of the model with dual numbers of dual numbers;
+//! everything else is linear.
 
 use nalgebra::{DMatrix, DVector};
 use tfe_runtime::dual::Dual;
 use tfe_runtime::{Controlled, First, Form, MAX_INPUTS, Real};
 
-/// Numbers with two directions: f, ∂f by one, ∂f by the other, and ∂²f by both.
+/// Numbers with derivatives in two directions: f, both first derivatives, and the mixed second derivative.
 type Twice = Dual<Dual>;
 
-/// A point of a block.
+/// A quadrature point of a block.
 #[derive(Clone, Debug)]
 pub(super) struct Point {
     /// The time.
     pub(super) t: f64,
-    /// w: what ℓ counts here.
+    /// The weight w_l of ℓ.
     pub(super) weight: f64,
-    /// P: (q, z, u) from s.
+    /// The matrix P_l, which maps s to (q, z, u).
     pub(super) map: DMatrix<f64>,
-    /// W: g to the rows of c.
+    /// The matrix W_l, which maps g to the rows of c.
     pub(super) into: DMatrix<f64>,
 }
 
-/// One block.
+/// A block of equations.
 #[derive(Clone, Debug)]
 pub(super) struct Block {
-    /// How many of the variables are inside: x, for which the first rows of c are solved.
+    /// The number of interior variables x, for which the first rows of c are solved.
     pub(super) interior: usize,
-    /// L.
+    /// The matrix L.
     pub(super) linear: DMatrix<f64>,
     pub(super) points: Vec<Point>,
     /// The columns of the outputs whose sum is ℓ.
     pub(super) costs: Vec<usize>,
 }
 
-/// c and f, and what the model says at the points.
+/// c and f, and the model functions at the points.
 #[derive(Clone, Debug)]
 pub(super) struct Values {
     pub(super) rows: DVector<f64>,
     pub(super) cost: f64,
-    /// g, point by point.
+    /// g at each point.
     pub(super) said: Vec<DVector<f64>>,
 }
 
-/// A block about some s, for some multipliers of its rows.
+/// A block linearised about s, for given multipliers of its rows.
 #[derive(Clone, Debug)]
 pub(super) struct Linear {
     pub(super) values: Values,
@@ -63,18 +64,18 @@ pub(super) struct Linear {
     pub(super) of_rows: DMatrix<f64>,
 }
 
-/// What a model says at a point: g, then the sum ℓ of the outputs in the columns `costs`.
+/// The functions of a model at a point: g, then the sum ℓ of the outputs in the columns `costs`.
 ///
-/// A search knows no more of its model, so that it is compiled once for all models.
+/// The search uses only this interface, so that it is compiled only once for all models.
 pub(super) trait PointFunctions {
-    /// In numbers.
+    /// Evaluates them in `f64`.
     fn numbers(&self, t: f64, arguments: &[f64], costs: &[usize], answer: &mut Vec<f64>);
 
-    /// With derivatives in two directions.
+    /// Evaluates them with derivatives in two directions.
     fn derivatives(&self, t: f64, arguments: &[Twice], costs: &[usize], answer: &mut Vec<Twice>);
 }
 
-/// What a model with N coordinates says.
+/// The functions of a model with N coordinates.
 pub(super) struct Said<'m, M, const N: usize>(pub(super) &'m M);
 
 impl<M: Controlled<N>, const N: usize> PointFunctions for Said<'_, M, N> {
@@ -87,7 +88,7 @@ impl<M: Controlled<N>, const N: usize> PointFunctions for Said<'_, M, N> {
     }
 }
 
-/// The same in any numbers. Room for the outputs is that of the answer.
+/// Evaluates the functions in any number type. `answer` also serves as buffer for the outputs.
 fn said<M: Controlled<N>, R: Real, const N: usize>(
     model: &M,
     t: f64,
@@ -145,7 +146,7 @@ impl Block {
         values
     }
 
-    /// Everything at s, with the second derivatives of the rows summed with `multipliers`.
+    /// Linearises at s, with the second derivatives of the rows summed with `multipliers`.
     pub(super) fn linearise(
         &self,
         model: &dyn PointFunctions,

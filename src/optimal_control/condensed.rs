@@ -1,18 +1,19 @@
-//! Blocks without their interior: what the chain of a quadratic problem is made of.
+//! Blocks whose interior variables are eliminated (condensed); they form the chain of the quadratic problem.
 
 use super::block::{Block, Linear};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
-/// A linearised block whose interior follows the outside, δs = Z δw + s₀ with Z = [−c_x⁻¹ c_w; 1] and s₀ = [−c_x⁻¹ c; 0].
+/// A linearised block whose interior variables follow the outer ones: δs = Z δw + s₀ with Z = [−c_x⁻¹ c_w; 1] and s₀ =
+/// [−c_x⁻¹ c; 0].
 #[derive(Clone, Debug)]
 pub(super) struct Condensed {
     pub(super) linear: Linear,
     interior: usize,
-    /// c_x transposed, in factors.
+    /// The factorised transpose of c_x.
     transposed: Option<LU<f64, Dyn, Dyn>>,
-    /// Z.
+    /// The matrix Z.
     follow: DMatrix<f64>,
-    /// s₀.
+    /// The vector s₀.
     own: DVector<f64>,
     /// The derivative of the end by w.
     pub(super) ends: DMatrix<f64>,
@@ -20,15 +21,15 @@ pub(super) struct Condensed {
     pub(super) reached: DVector<f64>,
 }
 
-/// H of δsᵀ H δs, with g the linear part, both in w alone.
+/// The quadratic form δwᵀ H δw with the linear part g, after condensation.
 pub(super) struct Quadratic {
     pub(super) matrix: DMatrix<f64>,
-    /// g, and g for steps along which no gap is closed.
+    /// The vector g, and g for steps that close no gaps.
     pub(super) gradients: DMatrix<f64>,
 }
 
 impl Condensed {
-    /// None where the interior does not follow from the outside, or where something is not finite.
+    /// `None` if the interior equations are singular or something is not finite.
     pub(super) fn new(block: &Block, linear: Linear) -> Option<Self> {
         let x = block.interior;
         let (rows, all) = linear.jacobian.shape();
@@ -68,12 +69,12 @@ impl Condensed {
         })
     }
 
-    /// H: the second derivatives of the cost and a share of those of the equations.
+    /// The Hessian: the second derivatives of the cost plus a fraction of those of the equations.
     pub(super) fn hessian(&self, share: f64) -> DMatrix<f64> {
         &self.linear.of_cost + share * &self.linear.of_rows
     }
 
-    /// What H and the gradient are in w.
+    /// Condenses the Hessian and the gradient to w.
     pub(super) fn quadratic(&self, hessian: &DMatrix<f64>) -> Quadratic {
         let own = &self.linear.gradient + hessian * &self.own;
         Quadratic {
@@ -85,17 +86,17 @@ impl Condensed {
         }
     }
 
-    /// δs of a step along which no gap is closed.
+    /// δs for a step that closes no gaps.
     pub(super) fn along(&self, outer: &DVector<f64>) -> DVector<f64> {
         &self.follow * outer
     }
 
-    /// δs.
+    /// δs for a step.
     pub(super) fn step(&self, outer: &DVector<f64>) -> DVector<f64> {
         &self.follow * outer + &self.own
     }
 
-    /// The multipliers of the rows of the interior, with those of the end.
+    /// The multipliers of the interior rows, given those of the end.
     pub(super) fn multipliers(
         &self,
         hessian: &DMatrix<f64>,

@@ -1,6 +1,7 @@
-//! The correction of an iterate: the minimum of a quadratic model of the Lagrangian of a problem, under its linearised equations.
+//! The SQP correction of an iterate: the minimum of a quadratic model of the Lagrangian under the linearised equations.
 //!
-//! Without interiors and inputs it is a chain in (δy_e, λ_e), which `assembly` solves by structured orthogonal elimination (theory.md, (T-144) to (T-148)).
+//! After condensation of interior variables and elimination of inputs it is a chain in (δy_e, λ_e), which `assembly`
+//! solves by structured orthogonal elimination (theory.md, (T-144) to (T-148)).
 
 use super::condensed::{Condensed, Quadratic};
 use super::problem::{Iterate, Problem};
@@ -17,11 +18,12 @@ pub(super) struct Step {
     pub(super) slope: f64,
     /// The second derivative of the model along the part of the step that closes no gaps.
     pub(super) curvature: f64,
-    /// What the cost has of it.
+    /// The part of this second derivative that comes from the cost.
     pub(super) of_cost: f64,
 }
 
-/// An element without inputs: δy₊ = A δy − G λ₊ + r and λ = Q δy + Aᵀ λ₊ + g. There are two g and r: those of the step, and those of its part that closes no gaps.
+/// An element whose inputs are eliminated: δy₊ = A δy − G λ₊ + r and λ = Q δy + Aᵀ λ₊ + g. There are two g and r: for
+/// the whole step, and for its part that closes no gaps.
 struct Link {
     by_inputs: Factored,
     a: DMatrix<f64>,
@@ -44,13 +46,13 @@ impl Factored {
     }
 }
 
-/// The steps that a chain is solved for: the whole one, and the part that closes no gaps.
+/// The right sides of the chain: the whole step, and the part of it that closes no gaps.
 const SIDES: usize = 2;
 const WHOLE: usize = 0;
 const ALONG: usize = 1;
 
 impl Problem<'_> {
-    /// Memory for the chain of a quadratic model.
+    /// Creates the chain of the quadratic model.
     pub(super) fn chain(&self) -> Chain {
         Chain::with_right_sides(4 * self.sizes.dof, 0, self.blocks.len(), 0, SIDES)
     }
@@ -111,7 +113,7 @@ impl Problem<'_> {
         })
     }
 
-    /// The minimum of the quadratic model with this share of the curvature of the equations.
+    /// The minimum of the quadratic model with a fraction of the curvature of the equations.
     pub(super) fn step(
         &self,
         chain: &mut Chain,
@@ -135,7 +137,8 @@ impl Problem<'_> {
             links.push(self.link(&condensed[element], &quadratic, &iterate.nodes[element + 1])?);
         }
         let units = units(&links, n);
-        // The numbers of the chain are y over its unit and λ times it: rows are scaled by the reciprocals of what columns are.
+        // The unknowns of the chain are y divided by its unit and λ multiplied by it: rows are scaled by the
+        // reciprocals of the column scales.
         let (state, costate) = (&units, &units.map(f64::recip));
         for (element, link) in links.iter().enumerate() {
             let backward = link.a.transpose().lu().try_inverse()?;
@@ -153,7 +156,7 @@ impl Problem<'_> {
                 let scaled = block.map_with_location(|i, j, x| of_rows[i] * x * of_columns[j]);
                 matrix.view_mut((row, column), (n, n)).copy_from(&scaled);
             }
-            // The storage of nalgebra goes by columns.
+            // Matrices of nalgebra are column-major.
             let rows = matrix.transpose();
             (chain.link_mut(element).matrix).copy_from_slice(rows.as_slice());
             let upper = &link.rights + &carried * &link.gradients;
@@ -172,7 +175,7 @@ impl Problem<'_> {
         self.solution((chain, &units), condensed, &hessians, &links, iterate)
     }
 
-    /// The conditions at both ends: a component is given, or its costate is that of the cost of the end.
+    /// The conditions at both ends: a component is prescribed, or its costate is the derivative of the cost of the end.
     fn close(
         &self,
         chain: &mut Chain,
@@ -212,7 +215,7 @@ impl Problem<'_> {
         }
     }
 
-    /// All unknowns from the nodes of the chain.
+    /// All unknowns of the step, from the nodes of the chain.
     fn solution(
         &self,
         (chain, units): (&Chain, &DVector<f64>),
@@ -280,8 +283,9 @@ impl Problem<'_> {
     }
 }
 
-/// Units of the state in which the inputs reach about one; those of the costate are their reciprocals, times one of the cost. Powers of two, so that nothing is rounded. Without them a problem
-/// of heavy bodies, or of weak inputs, would look like one whose inputs move nothing.
+/// Units of the state in which the effect of the inputs is about one; those of the costate are their reciprocals times
+/// a unit of the cost. They are powers of two, which cause no rounding. Without them, heavy bodies or weak inputs would
+/// look like inputs without effect.
 fn units(links: &[Link], n: usize) -> DVector<f64> {
     DVector::from_fn(n, |at, _| {
         let reached: f64 = links.iter().map(|link| link.g[(at, at)].abs()).sum();

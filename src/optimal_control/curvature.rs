@@ -1,28 +1,31 @@
-//! Whether a stationary point is a minimum: the changes beside it along which the problem curves down (theory.md, (T-163)).
+//! Second-order test of a stationary point: searches for directions of negative curvature (theory.md, (T-163)).
 //!
-//! A sweep backwards from the end asks in each element what its inputs may do while its start stays and the inputs behind it answer as is best. Where that curves down, the
-//! change is moved to what is given of the end, and judged by its own second derivative.
+//! A backward sweep (Riccati recursion) from the end examines, in each element, the inputs of that element at fixed
+//! start, with optimal feedback by the later inputs. A direction of negative curvature is corrected to satisfy the
+//! prescribed components of the end, and then judged by its own second derivative.
 
 use super::condensed::Condensed;
 use super::problem::{Iterate, Problem};
 use nalgebra::{DMatrix, DVector, Dyn, LU, SymmetricEigen};
 
-/// What it counts to miss the end that is given by as much as the inputs reach at the cost of one. It decides which changes are looked at, not what is found of them.
+/// The penalty for missing the prescribed end by the reach of the inputs at unit cost. It influences which directions
+/// are examined, but not their curvature.
 const MISS: f64 = 1e8;
 
-/// So many times a change is moved to its end: the second time takes away the roundings of the first.
+/// The number of corrections to the prescribed end; the second one removes the rounding errors of the first.
 const PASSES: usize = 2;
 
-/// A change along which the linearised equations hold and what is given of the ends stays, while the problem curves down.
+/// A direction of negative curvature that satisfies the linearised equations and keeps the prescribed components of the
+/// ends.
 pub(super) struct Descent {
     pub(super) change: Iterate,
-    /// δwᵀ H δw.
+    /// The curvature δwᵀ H δw.
     pub(super) curvature: f64,
-    /// The element in which it begins.
+    /// The element in which the change begins.
     pub(super) element: usize,
 }
 
-/// The nodes and the inputs of a change.
+/// The nodes and the inputs of a direction.
 struct Motion {
     nodes: Vec<DVector<f64>>,
     steering: Vec<DVector<f64>>,
@@ -36,41 +39,42 @@ impl Motion {
     }
 }
 
-/// A change that curves down.
+/// A direction of negative curvature.
 struct Candidate {
     motion: Motion,
     element: usize,
     curvature: f64,
-    /// The curvature beside the sizes of what it is the sum of.
+    /// The curvature relative to the sizes of its summands.
     share: f64,
 }
 
-/// How changes are moved to what is given of the end: by the inputs, and free components of the start, that are smallest.
+/// The least-norm correction that satisfies the prescribed components of the end, by the inputs and the free components
+/// of the start.
 struct Closing {
     given: Vec<usize>,
-    /// What the start and the inputs do for one unit of each component.
+    /// The changes of the start and of the inputs for one unit of each component.
     start: DMatrix<f64>,
     inputs: Vec<DMatrix<f64>>,
     factors: LU<f64, Dyn, Dyn>,
 }
 
-/// The quadratic problem about a stationary point.
+/// The quadratic problem at a stationary point.
 struct Neighbourhood<'a> {
     problem: &'a Problem<'a>,
     condensed: &'a [Condensed],
-    /// H of each block.
+    /// The matrix H of each block.
     second: Vec<DMatrix<f64>>,
-    /// What the inputs of all elements reach at the cost of one, component by component of the state.
+    /// The reach of the inputs of all elements at unit cost, for each component of the state.
     units: DVector<f64>,
-    /// K: the inputs that answer best to the state, −K δy.
+    /// The feedback matrices K: the optimal inputs are −K δy.
     feedback: Vec<DMatrix<f64>>,
     closing: Option<Closing>,
 }
 
 impl Problem<'_> {
-    /// The change along which the problem curves down most, beside the sizes of what is summed there; none at a minimum.
+    /// The direction of most negative curvature, relative to the sizes of its summands; `None` at a minimum.
     ///
-    /// `flat`: the share of these sizes below which a curvature is none.
+    /// `flat` is the relative curvature below which a direction counts as flat.
     pub(super) fn descent(&self, condensed: &[Condensed], flat: f64) -> Option<Descent> {
         let mut neighbourhood = Neighbourhood::new(self, condensed);
         let lowest = neighbourhood.lowest(flat)?;
@@ -119,7 +123,7 @@ impl<'a> Neighbourhood<'a> {
         }
     }
 
-    /// The second derivative of what the end costs, with what it counts to miss it.
+    /// The second derivative of the cost of the end, including the penalty for missing it.
     fn at_end(&self) -> DMatrix<f64> {
         let n = self.units.len();
         let end = self.second.get(self.problem.blocks.len());
@@ -132,7 +136,7 @@ impl<'a> Neighbourhood<'a> {
         worth
     }
 
-    /// The change that curves down most.
+    /// The direction of most negative curvature.
     fn lowest(&mut self, flat: f64) -> Option<Candidate> {
         let n = self.units.len();
         let mut lowest: Option<Candidate> = None;
@@ -142,7 +146,7 @@ impl<'a> Neighbourhood<'a> {
             let reached = &one.ends;
             let c = reached.ncols() - n;
             let total = &self.second[element] + reached.tr_mul(&(&worth * reached));
-            // Inputs in units of their own: each entry is the sum of terms of these sizes.
+            // Each input is scaled by the sizes of the summands of its diagonal entry.
             let by_inputs = reached.columns(n, c).abs();
             let sizes = self.second[element].view((n, n), (c, c)).abs()
                 + by_inputs.tr_mul(&(worth.abs() * &by_inputs));
@@ -166,7 +170,7 @@ impl<'a> Neighbourhood<'a> {
                 let motion = self.motion(element, DVector::zeros(n), Some(&push));
                 lowest = self.lower(lowest, motion, element, flat);
             }
-            // Inputs without a curvature that could be told stay as they are.
+            // Inputs without significant curvature are left unchanged by the feedback.
             let coupling = total.view((n, 0), (c, n)).into_owned();
             let mut feedback = DMatrix::<f64>::zeros(c, n);
             for (pivot, vector) in pivots.iter().zip(vectors.column_iter()) {
@@ -188,7 +192,7 @@ impl<'a> Neighbourhood<'a> {
         self.beside_start(lowest, &worth, flat)
     }
 
-    /// With the components of the start that are free.
+    /// Also examines the free components of the start.
     fn beside_start(
         &self,
         lowest: Option<Candidate>,
@@ -215,7 +219,7 @@ impl<'a> Neighbourhood<'a> {
         lowest
     }
 
-    /// The change from a node on, the inputs of whose first element are a push and all others answers.
+    /// The direction that begins at a node: `push` is applied in the first element, and feedback in all others.
     fn motion(&self, first: usize, start: DVector<f64>, push: Option<&DVector<f64>>) -> Motion {
         let (n, c) = (self.units.len(), self.problem.sizes.steering());
         let mut motion = Motion {
@@ -237,7 +241,7 @@ impl<'a> Neighbourhood<'a> {
         motion
     }
 
-    /// The lower one of what was found so far and a change.
+    /// The more negative one of two directions, the second of which is still to be judged.
     fn lower(
         &self,
         lowest: Option<Candidate>,
@@ -252,7 +256,7 @@ impl<'a> Neighbourhood<'a> {
         }
     }
 
-    /// A change that keeps its ends, if it curves down.
+    /// Corrects a direction at the ends, and returns it if its curvature is negative.
     fn judged(&self, mut motion: Motion, element: usize, flat: f64) -> Option<Candidate> {
         if let Some(closing) = &self.closing {
             closing.close(&mut motion, self.condensed, &self.units)?;
@@ -282,7 +286,7 @@ impl<'a> Neighbourhood<'a> {
         })
     }
 
-    /// All unknowns of a change; multipliers stay.
+    /// The change of all unknowns in a direction; multipliers stay.
     fn change(&self, motion: Motion) -> Iterate {
         let n = self.units.len();
         let (mut interiors, mut multipliers) = (Vec::new(), Vec::new());
@@ -304,7 +308,7 @@ impl<'a> Neighbourhood<'a> {
 }
 
 impl Closing {
-    /// None where nothing is given of the end.
+    /// `None` if no component of the end is prescribed.
     fn new(
         problem: &Problem<'_>,
         condensed: &[Condensed],
@@ -349,7 +353,7 @@ impl Closing {
         })
     }
 
-    /// By how much a change misses what is given, in units of what inputs reach.
+    /// The deviation from the prescribed end, in units of the reach of the inputs.
     fn missed(&self, motion: &Motion, units: &DVector<f64>) -> DVector<f64> {
         let last = &motion.nodes[self.inputs.len()];
         DVector::from_fn(self.given.len(), |row, _| {
@@ -358,7 +362,7 @@ impl Closing {
         })
     }
 
-    /// Moves a change to what is given of the end; none where inputs do not reach it.
+    /// Corrects a direction to satisfy the prescribed end; `None` if the inputs cannot reach it.
     fn close(
         &self,
         motion: &mut Motion,
@@ -381,7 +385,7 @@ impl Closing {
     }
 }
 
-/// δw of an element.
+/// The vector δw of an element.
 fn stacked(node: &DVector<f64>, inputs: &[f64]) -> DVector<f64> {
     DVector::from_vec([node.as_slice(), inputs].concat())
 }
@@ -391,7 +395,7 @@ fn symmetric(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     (matrix + matrix.transpose()) * 0.5
 }
 
-/// Eigenvalues and eigenvectors of a symmetric matrix; none of one that is not finite.
+/// Eigenvalues and eigenvectors of a symmetric matrix; `None` if it is not finite.
 fn eigen(matrix: DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     if matrix.nrows() == 0 {
         return Some((DVector::zeros(0), matrix));
@@ -404,7 +408,7 @@ fn eigen(matrix: DMatrix<f64>) -> Option<(DVector<f64>, DMatrix<f64>)> {
     Some((eigen.eigenvalues, eigen.eigenvectors))
 }
 
-/// The smallest number, and where it is.
+/// The smallest number and its index.
 fn smallest(values: &DVector<f64>) -> Option<(usize, f64)> {
     let values = values.iter().copied().enumerate();
     values.min_by(|(_, a), (_, b)| a.total_cmp(b))

@@ -1,13 +1,14 @@
-//! Which outputs hold an input: kernels evaluated with numbers that know nothing but that.
+//! Finds the outputs that depend on an input, by evaluating the kernels with numbers that only track this dependence.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use tfe_runtime::{Controlled, MAX_INPUTS, Real};
 
-/// Whether a number was made with the input that is asked about, whatever its value.
+/// Whether a number was computed from the input in question, whatever its value.
 #[derive(Clone, Copy, Debug)]
 struct Holds(bool);
 
-/// For each column of the outputs, whether it holds an input: also where its derivative by the input vanishes, as that of u dx/dt at rest.
+/// For each output, whether it depends on an input. This is also found where the derivative vanishes, as for u dx/dt at
+/// rest.
 pub(super) fn holding<M: Controlled<N>, const N: usize>(model: &M, input: usize) -> Vec<bool> {
     let none = Holds(false);
     let mut inputs = [none; MAX_INPUTS];
@@ -72,7 +73,7 @@ macro_rules! of_two {
 }
 
 impl Real for Holds {
-    /// Whether what is compared holds it.
+    /// Whether a compared number depends on the input.
     type Mask = bool;
 
     fn from_f64(_: f64) -> Self {

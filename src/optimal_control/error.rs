@@ -1,4 +1,4 @@
-//! Why there is no optimum.
+//! The errors of optimal control.
 
 use super::optimum::Optimum;
 use crate::boundary::BoundaryError;

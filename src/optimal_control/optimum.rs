@@ -1,4 +1,4 @@
-//! What a search has found.
+//! The result of an optimal control problem.
 
 use super::problem::{Iterate, Problem};
 use super::search::Iteration;
@@ -105,24 +105,24 @@ impl<const N: usize> Optimum<N> {
     }
 }
 
-/// Inputs, polynomials in each element.
+/// Inputs that are polynomials in each element.
 #[derive(Debug)]
 pub(super) struct Pieces {
     /// The ends of the elements.
     pub(super) times: Vec<f64>,
     pub(super) inputs: usize,
-    /// For each element the coefficients of Legendre's polynomials, of all inputs for each.
+    /// For each element the coefficients of the Legendre polynomials; for each polynomial those of all inputs.
     pub(super) coefficients: Vec<Vec<f64>>,
 }
 
 impl Pieces {
-    /// The element of a time.
+    /// The element that contains a time.
     fn element(&self, t: f64) -> usize {
         let inner = &self.times[1..self.times.len() - 1];
         inner.partition_point(|end| *end <= t)
     }
 
-    /// An input in an element.
+    /// The value of an input in an element.
     fn at(&self, element: usize, input: usize, t: f64) -> f64 {
         let (start, end) = (self.times[element], self.times[element + 1]);
         let mut basis = [0.0; MAX_NODES];
@@ -134,20 +134,20 @@ impl Pieces {
     }
 }
 
-/// A model whose inputs are these functions.
+/// A model whose inputs are given functions.
 fn steered<'m, M: Controlled<N>, F: Fn(f64) -> f64 + Send + Sync + 'm, const N: usize>(
     model: &'m M,
     function: impl Fn(usize) -> F,
 ) -> Driven<'m, M> {
     let names = M::INPUTS.iter().enumerate();
     names.fold(Driven::new(model), |driven, (input, name)| {
-        // The names are the model's own.
+        // The names are those of the model, so they exist.
         let with = driven.clone().input(name, function(input));
         with.unwrap_or(driven)
     })
 }
 
-/// Where a search has ended, with the model.
+/// The final iterate, with the model.
 pub(super) struct Found<'m, M> {
     pub(super) model: &'m M,
     pub(super) element: Element,
@@ -175,7 +175,7 @@ impl<M> Found<'_, M> {
             .collect()
     }
 
-    /// The motion through the elements as they are.
+    /// The motion with the polynomials of the elements, without integrating again.
     pub(super) fn motion<const N: usize>(
         &self,
         problem: &Problem<'_>,
@@ -185,7 +185,7 @@ impl<M> Found<'_, M> {
     where
         M: Controlled<N>,
     {
-        // At a node the inputs are those of the element that is looked at.
+        // At a node, the inputs are those of the element that is evaluated.
         let current = Arc::new(AtomicUsize::new(0));
         let driven = steered(self.model, |input| {
             let (pieces, element) = (Arc::clone(&self.pieces), Arc::clone(&current));
@@ -216,7 +216,8 @@ impl<M> Found<'_, M> {
         .motion_told(|element| current.store(element, Ordering::Relaxed))
     }
 
-    /// The interiors in the order of the elements' own equations: rates, or in phase space rates of momenta and then of coordinates.
+    /// The interior unknowns in the order of the element's own equations: rates; in phase space, the rates of the
+    /// momenta, then those of the coordinates.
     fn interiors<const N: usize>(
         &self,
         driven: &Driven<'_, M>,

@@ -1,27 +1,27 @@
-//! What is to be minimised: blocks of equations that nodes join to a chain, and their numbers at an iterate.
+//! The nonlinear program: blocks of equations that nodes connect to a chain, and their values at an iterate.
 
 use super::block::{Block, PointFunctions, Values};
 use super::condensed::Condensed;
 use super::transcription::Sizes;
 use nalgebra::DVector;
 
-/// The unknowns, or a change of them.
+/// The unknowns and multipliers, or a change of them.
 #[derive(Clone, Debug)]
 pub(super) struct Iterate {
-    /// (p, q) of the nodes.
+    /// The states (p, q) of the nodes.
     pub(super) nodes: Vec<DVector<f64>>,
-    /// The interiors of the elements, and then of the block of the end.
+    /// The interior variables of the elements, then those of the block of the end.
     pub(super) interiors: Vec<DVector<f64>>,
     /// The coefficients of the inputs.
     pub(super) steering: Vec<DVector<f64>>,
     /// The multipliers of the rows of the interiors.
     pub(super) multipliers: Vec<DVector<f64>>,
-    /// λ: what a change of each node is worth.
+    /// The costates λ: the derivatives of the cost by changes of the nodes.
     pub(super) costates: Vec<DVector<f64>>,
 }
 
 impl Iterate {
-    /// Adds a part of a change.
+    /// Adds a fraction of a change.
     pub(super) fn add(&mut self, factor: f64, step: &Self) {
         let own = [
             &mut self.nodes,
@@ -45,41 +45,41 @@ impl Iterate {
     }
 }
 
-/// What a node at an end of the chain is held by.
+/// The prescribed components at the ends of the chain.
 #[derive(Clone, Debug)]
 pub(super) struct Ends {
-    /// Which components (p, q) of the first node are given.
+    /// Whether each component (p, q) of the first node is prescribed.
     pub(super) first: Vec<bool>,
-    /// Which of the last.
+    /// Whether each component of the last node is prescribed.
     pub(super) last: Vec<bool>,
 }
 
-/// What is to be minimised.
+/// An optimal control problem after transcription.
 pub(super) struct Problem<'a> {
     pub(super) model: &'a dyn PointFunctions,
     pub(super) sizes: Sizes,
-    /// One for each element.
+    /// The blocks of the elements.
     pub(super) blocks: Vec<Block>,
-    /// What the end costs.
+    /// The block of the cost of the end.
     pub(super) end: Option<Block>,
-    /// Lengths of the elements.
+    /// The lengths of the elements.
     pub(super) lengths: Vec<f64>,
     pub(super) ends: Ends,
 }
 
-/// Cost and residuals of all blocks.
+/// The cost and the residuals of all blocks.
 pub(super) struct Evaluation {
     pub(super) cost: f64,
     pub(super) rows: Vec<DVector<f64>>,
 }
 
 impl Evaluation {
-    /// The cost, with what violated equations count.
+    /// The merit function: the cost plus weighted violations of the equations.
     pub(super) fn merit(&self, weights: &[DVector<f64>]) -> f64 {
         self.cost + self.violation(weights)
     }
 
-    /// What violated equations count alone.
+    /// The weighted violations of the equations.
     pub(super) fn violation(&self, weights: &[DVector<f64>]) -> f64 {
         let blocks = self.rows.iter().zip(weights);
         blocks.map(|(rows, weights)| rows.abs().dot(weights)).sum()
@@ -91,7 +91,7 @@ impl Problem<'_> {
         self.blocks.iter().chain(&self.end)
     }
 
-    /// s of a block.
+    /// The variables s of a block.
     pub(super) fn variables(&self, iterate: &Iterate, block: usize) -> DVector<f64> {
         let steering = iterate.steering.get(block).map(DVector::as_slice);
         let parts = [
@@ -102,7 +102,7 @@ impl Problem<'_> {
         DVector::from_vec(parts.concat())
     }
 
-    /// The residuals of a block, of which the last are gaps to the node that follows.
+    /// The residuals of a block; the last ones are the gaps to the next node.
     fn residuals(&self, values: &Values, iterate: &Iterate, block: usize) -> DVector<f64> {
         let mut rows = values.rows.clone();
         if block < self.blocks.len() {
@@ -142,14 +142,14 @@ impl Problem<'_> {
         DVector::from_vec([inner, end].concat())
     }
 
-    /// 𝓛: the cost of an iterate and its residuals, weighed with its multipliers (theory.md, (T-145)).
+    /// The Lagrangian 𝓛: the cost plus the residuals weighted by the multipliers (theory.md, (T-145)).
     pub(super) fn lagrangian(&self, evaluation: &Evaluation, iterate: &Iterate) -> f64 {
         let blocks = evaluation.rows.iter().enumerate();
         let rows = blocks.map(|(at, rows)| rows.dot(&self.multipliers(iterate, at)));
         evaluation.cost + rows.sum::<f64>()
     }
 
-    /// All blocks about an iterate; the number of one that has no linearisation.
+    /// Linearises and condenses all blocks at an iterate; the error is the index of a block for which this fails.
     pub(super) fn linearise(&self, iterate: &Iterate) -> Result<Vec<Condensed>, usize> {
         let blocks = self.blocks().enumerate().map(|(at, block)| {
             let multipliers = self.multipliers(iterate, at);

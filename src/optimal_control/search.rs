@@ -1,4 +1,4 @@
-//! Sequential quadratic programming on a chain of elements: corrections until they are small, each as far as a merit falls.
+//! Sequential quadratic programming on a chain of elements, with a line search on a merit function.
 
 use super::condensed::Condensed;
 use super::correction::Step;
@@ -27,10 +27,10 @@ pub struct Iteration {
     pub curvature: f64,
 }
 
-/// Why a search ended without a solution.
+/// The error of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Failure {
-    /// An element has no linearisation.
+    /// An element cannot be linearised.
     Undefined {
         element: usize,
     },
@@ -39,13 +39,13 @@ pub(super) enum Failure {
     Stalled {
         correction: f64,
     },
-    /// A stationary point from which the cost falls, along changes that begin in an element.
+    /// A stationary point at which the cost has negative curvature, in a direction that begins in an element.
     NoMinimum {
         element: usize,
     },
 }
 
-/// How it is searched.
+/// The parameters of a search.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Control {
     pub(super) tolerance: f64,
@@ -53,7 +53,8 @@ pub(super) struct Control {
     pub(super) progress: bool,
 }
 
-/// Shares of the curvature of the equations that are tried, and with the last one a weight on the changes of the inputs.
+/// The quadratic models that are tried in turn: the fraction of the curvature of the equations, and a weight on the
+/// changes of the inputs (regularisation).
 const MODELS: [(f64, f64); 11] = [
     (1.0, 0.0),
     (0.5, 0.0),
@@ -68,44 +69,47 @@ const MODELS: [(f64, f64); 11] = [
     (0.0, 100.0),
 ];
 
-/// The least curvature of a model along its step, beside what the cost alone has there.
+/// The least curvature of a model along its step, relative to that of the cost alone.
 const LEAST_CURVATURE: f64 = 1e-3;
 
-/// The weights of violated equations beside their multipliers, and the most that they may be.
+/// The weights of the merit function relative to the multipliers: the usual and the largest ratio.
 const MARGIN: f64 = 1.1;
 const LARGEST_MARGIN: f64 = 10.0;
 
-/// How much of the decrease that the slope promises a step must bring.
+/// The fraction of the predicted decrease that a step must achieve (Armijo condition).
 const DECREASE: f64 = 1e-4;
 
-/// The shortest part of a step that is tried: before another model is, and of the last ones.
+/// The shortest fraction of a step before another model is tried, and the shortest for the last model.
 const SHORT: f64 = 1.0 / 16.0;
 const SHORTEST: f64 = 1.0 / 1024.0;
 
-/// So many of the last merits are looked at: the merit of an iterate need only fall below the largest of them, because it may rise along steps of Newton's method near a solution (Maratos).
+/// The number of past merits with the largest of which a step is compared (nonmonotone line search): near a solution,
+/// Newton steps may increase the merit (Maratos effect).
 const MEMORY: usize = 4;
 
-/// Corrections below this one are taken whole: what the merit tells there is rounding.
+/// Smaller corrections are applied completely: differences of the merit are rounding errors there.
 const NEAR: f64 = 1e-7;
 
-/// Corrections below this one that no longer fall are round-off.
+/// Smaller corrections that no longer decrease are rounding errors.
 const ROUND_OFF: f64 = 1e-9;
 
-/// The least share of a downward curvature in the sizes of what it is the sum of. At best the cost falls by some square of it along such a change, which below some 10⁻⁸ is lost in the roundings of the
-/// cost; and where a search comes near slowly, as where inputs cost nothing, second derivatives are known to some hundred of its last corrections.
+/// The least relative size of a negative curvature that counts. The cost decreases by about its square along such a
+/// direction, which for sizes below about 10⁻⁸ is lost in rounding errors. After slow convergence, as with inputs
+/// without cost, second derivatives have errors of about a hundred times the last correction.
 const FLAT: f64 = 1e-7;
 
-/// How often a search leaves stationary points that are no minima.
+/// The number of stationary points other than minima that a search may leave.
 const DEPARTURES: usize = 8;
 
-/// The share of what the curvature promises by which the Lagrangian must fall for a stationary point to be left so far: a half, as it does at the minimum of a polynomial of fourth degree.
+/// The fraction of the decrease predicted by the negative curvature that the Lagrangian must achieve: one half, as at
+/// the minimum of a fourth-degree polynomial.
 const PROMISED: f64 = 0.5;
 
-/// How often the distance to which a point is left is halved or doubled.
+/// The largest number of times that the distance from a stationary point is halved or doubled.
 const DISTANCES: usize = 128;
 
 impl Problem<'_> {
-    /// The correction beside the iterate.
+    /// The size of the correction relative to the iterate.
     fn size(&self, step: &Step, condensed: &[Condensed], iterate: &Iterate) -> f64 {
         let n = self.sizes.dof;
         let nodes = iterate.nodes.iter().zip(&step.change.nodes);
@@ -127,7 +131,7 @@ impl Problem<'_> {
         size(nodes, &matrices, inputs)
     }
 
-    /// The gap between elements, beside the largest number of the nodes.
+    /// The largest gap between elements relative to the largest component of the nodes.
     fn gap(&self, evaluation: &Evaluation, iterate: &Iterate) -> f64 {
         let x = self.sizes.interior;
         let elements = &evaluation.rows[..self.blocks.len()];
@@ -139,7 +143,7 @@ impl Problem<'_> {
         if gap == 0.0 { 0.0 } else { gap / largest }
     }
 
-    /// Looks for the minimum from an iterate on, which is left where the search ends.
+    /// Searches for the minimum from an iterate, which is updated to the final one.
     pub(super) fn solve(
         &self,
         iterate: &mut Iterate,
@@ -186,7 +190,7 @@ impl Problem<'_> {
                         );
                     }
                     evaluation = there;
-                    // The search begins anew: what counts is no longer whether the merit falls below that of the point that was left.
+                    // The search starts anew, so earlier merits no longer count.
                     past.clear();
                     weights.clear();
                     last = f64::INFINITY;
@@ -232,9 +236,10 @@ impl Problem<'_> {
         }
     }
 
-    /// Leaves a stationary point that is no minimum, with the element in which the change begins that leads away; none at a minimum.
+    /// Leaves a stationary point that is not a minimum; returns the element in which the direction of descent begins.
+    /// `None` at a minimum.
     ///
-    /// `is_last` says that no search would follow.
+    /// `is_last`: no search would follow.
     fn leave(
         &self,
         iterate: &mut Iterate,
@@ -256,9 +261,11 @@ impl Problem<'_> {
         Ok(Some((element, evaluation)))
     }
 
-    /// As far along a change that curves down as the Lagrangian falls as the curvature promises; none where that is nowhere, or everywhere.
+    /// Moves in a direction of negative curvature as far as the Lagrangian decreases as predicted; `None` if it nowhere
+    /// does, or does at any distance.
     ///
-    /// The Lagrangian tells it rather than the merit, which may rise along every straight line from a point where equations are curved. The better one of both sides is taken.
+    /// The Lagrangian is used instead of the merit function, which may increase along every straight line if the
+    /// equations are nonlinear. Both signs of the direction are tried.
     fn departed(&self, iterate: &Iterate, descent: &Descent) -> Option<(Iterate, Evaluation)> {
         let start = self.evaluate(iterate);
         let level = self.lagrangian(&start, iterate);
@@ -303,7 +310,8 @@ impl Problem<'_> {
         None
     }
 
-    /// Takes a part of a step with which the merit falls; the part, and what is then.
+    /// Applies the largest fraction of a step that decreases the merit sufficiently; returns the fraction and the
+    /// evaluation there.
     fn shortened(
         &self,
         iterate: &mut Iterate,
@@ -349,7 +357,7 @@ impl Problem<'_> {
     }
 }
 
-/// How many times as large as their multipliers the weights of violated equations must be for the merit to fall along a step; none where they would have to be too large.
+/// The ratio of weights to multipliers with which the merit decreases along a step; `None` if it would be too large.
 fn margin(step: &Step, now: &Evaluation) -> Option<f64> {
     let gaps = now.violation(&step.rows.iter().map(DVector::abs).collect::<Vec<_>>());
     let needed = step.slope / gaps + LEAST_CURVATURE;
@@ -359,7 +367,7 @@ fn margin(step: &Step, now: &Evaluation) -> Option<f64> {
     (needed <= LARGEST_MARGIN).then_some(needed.max(MARGIN))
 }
 
-/// Makes the weights of violated equations larger than their multipliers, and lets those fall slowly that are much larger (Powell).
+/// Raises the weights above the multipliers, and lowers those that are much larger gradually (Powell).
 fn raise(weights: &mut Vec<DVector<f64>>, multipliers: &[DVector<f64>], margin: f64) {
     if weights.is_empty() {
         *weights = multipliers.iter().map(|rows| margin * rows.abs()).collect();

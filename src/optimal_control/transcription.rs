@@ -1,7 +1,8 @@
-//! Elements as blocks: which variables they have, and which equations.
+//! Transcription of elements to blocks of equations.
 //!
-//! Inside an element are the rates ν_j of the coordinates (and, of a Hamiltonian, the momenta p_l of the points), outside the state (p, q) of its first node and the
-//! coefficients of its inputs, polynomials in time. With the tables of the element (theory.md, section 4)
+//! The interior variables of an element are the rates ν_j of the coordinates (and, for a Hamiltonian, the momenta p_l
+//! at the points). The outer ones are the state (p, q) of its first node and the coefficients of its inputs, which are
+//! polynomials in time. With the tables of the element (theory.md, section 4)
 //!
 //! ```text
 //! q_l = q₀ + h Σ_j C_lj ν_j ,     v_l = Σ_j E_lj ν_j ,     u_l = Σ_k P_k(c_l) û_k ,
@@ -17,13 +18,13 @@ use tfe_runtime::scheme::SchemeRef;
 /// The numbers of variables of an element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sizes {
-    /// N.
+    /// The number N of coordinates.
     pub(super) dof: usize,
-    /// x.
+    /// The number of interior variables x.
     pub(super) interior: usize,
     /// The number of inputs.
     pub(super) inputs: usize,
-    /// The coefficients of each.
+    /// The number of coefficients of each input.
     pub(super) coefficients: usize,
 }
 
@@ -47,23 +48,23 @@ impl Sizes {
         }
     }
 
-    /// The coefficients of all inputs.
+    /// The number of coefficients of all inputs.
     pub(super) fn steering(&self) -> usize {
         self.inputs * self.coefficients
     }
 
-    /// (p₀, q₀) and the coefficients of the inputs.
+    /// The number of outer variables: (p₀, q₀) and the coefficients of the inputs.
     pub(super) fn outer(&self) -> usize {
         2 * self.dof + self.steering()
     }
 
-    /// s.
+    /// The number of all variables s.
     pub(super) fn all(&self) -> usize {
         self.interior + self.outer()
     }
 }
 
-/// An element: rows are those of the interior, then its end (p₁, q₁).
+/// The block of an element. Its rows are the interior equations, then the end (p₁, q₁).
 pub(super) fn element(
     form: Form,
     scheme: &SchemeRef<'_>,
@@ -82,7 +83,7 @@ pub(super) fn element(
     let rows = interior + 2 * n;
     let (end_p, end_q) = (interior, interior + n);
     let is_hamiltonian = form == Form::Hamiltonian;
-    // The momenta of the points among the variables, and the rows v_l = H_p.
+    // The momenta at the points are variables, with the rows v_l = H_p.
     let momentum = |l: usize, a: usize| (unknowns + l) * n + a;
     let mut linear = DMatrix::zeros(rows, sizes.all());
     for a in 0..n {
@@ -147,7 +148,7 @@ pub(super) fn element(
     }
 }
 
-/// The cost of the end: of a Lagrangian its velocity is inside, with L_v − p = 0.
+/// The block of the cost of the end. For a Lagrangian, its interior variable is the velocity, with L_v − p = 0.
 pub(super) fn end(form: Form, n: usize, time: f64, costs: &[usize]) -> Block {
     let interior = match form {
         Form::Lagrangian => n,
