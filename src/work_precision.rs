@@ -365,7 +365,7 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
         })
     }
 
-    /// The steps of every run, the longest first.
+    /// The meshes of all runs, from the longest step on.
     fn grids(&self) -> Result<Vec<Grid>, WorkPrecisionError> {
         if self.elements.is_empty() {
             return Err(WorkPrecisionError::NoElements);
@@ -382,7 +382,7 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
         Ok(grids)
     }
 
-    /// Refuses a start from which no simulation begins.
+    /// Refuses a start at which no run can begin.
     fn check_start(&self, grids: &[Grid]) -> Result<(), WorkPrecisionError> {
         let Some(grid) = grids.last() else {
             return Err(WorkPrecisionError::NoSteps);
@@ -398,16 +398,16 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
     }
 }
 
-/// A line of progress on standard error, where it is wanted.
+/// Writes a line of progress to standard error, if wanted.
 pub(crate) fn report(is_wanted: bool, line: fmt::Arguments<'_>) {
     if is_wanted {
-        // Progress that cannot be shown is no reason to stop.
+        // Errors of the display are ignored.
         let _ = writeln!(std::io::stderr(), "{line}");
     }
 }
 
 impl<M, S> fmt::Debug for WorkPrecision<'_, M, S> {
-    /// What is to be run; models and functions may have nothing to show.
+    /// Shows the settings; models and functions need not be `Debug`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("WorkPrecision")
             .field("title", &self.title)

@@ -1,4 +1,4 @@
-//! What can go wrong before the first run, and after the last.
+//! The errors of work-precision diagrams, before the first run and when results are written.
 
 #[cfg(feature = "charts")]
 use crate::charts::ChartError;

@@ -1,4 +1,4 @@
-//! The power law in a curve of errors.
+//! Fits a power law to a curve of errors.
 
 use crate::numbers::larger;
 
@@ -17,17 +17,17 @@ pub struct Slope {
     pub residual: f64,
 }
 
-/// Errors above it are those of a motion that is lost.
+/// Runs with larger errors have lost the motion.
 const LOST: f64 = 0.1;
-/// The level of a floor, at most: above it curves are flat because nothing is resolved.
+/// The highest floor: above this, a curve is flat because steps do not resolve the motion.
 const HIGHEST_FLOOR: f64 = 1e-3;
-/// By what factor a point of the power law lies above a floor.
+/// The least ratio of errors of the power law to the floor.
 const ABOVE_FLOOR: f64 = 10.0;
-/// How far a point may be off the line, in decades.
+/// The largest deviation of a point from the line, in decades.
 const STRAIGHT: f64 = 0.1;
 
-/// The error that shorter steps do not improve: the least one from where errors no longer fall, which is where they fall more slowly than
-/// √h to every later point. `errors`: (step, error), the longest step first.
+/// The error floor that shorter steps do not reduce: the least error from where the errors decrease more slowly than √h
+/// to every later point. `errors`: (step, error), the longest step first.
 pub(super) fn floor(errors: &[(f64, f64)]) -> Option<f64> {
     let (start, _) = plateau(errors)?;
     errors[start..]
@@ -36,7 +36,7 @@ pub(super) fn floor(errors: &[(f64, f64)]) -> Option<f64> {
         .reduce(f64::min)
 }
 
-/// Where the plateau begins, and its error there.
+/// The index at which the plateau begins, and the error there.
 fn plateau(errors: &[(f64, f64)]) -> Option<(usize, f64)> {
     let is_flat = |i: usize| {
         let (h, error) = errors[i];
@@ -52,7 +52,7 @@ fn plateau(errors: &[(f64, f64)]) -> Option<(usize, f64)> {
         .map(|i| (i, errors[i].1))
 }
 
-/// The slope of a curve whose reference is known to `uncertainty`. `errors`: (step, error), the longest step first.
+/// The slope of a curve whose reference has the error `uncertainty`. `errors`: (step, error), the longest step first.
 pub(super) fn slope(errors: &[(f64, f64)], uncertainty: f64) -> Option<Slope> {
     let (end, level) = plateau(errors).unwrap_or((errors.len(), 0.0));
     let least = ABOVE_FLOOR * level.max(uncertainty);
@@ -71,7 +71,7 @@ pub(super) fn slope(errors: &[(f64, f64)], uncertainty: f64) -> Option<Slope> {
     }
 }
 
-/// The line of least squares; none through fewer than two different steps.
+/// The least-squares line; `None` for fewer than two different steps.
 fn line(points: &[(f64, f64)]) -> Option<Slope> {
     let count = points.len() as f64;
     let mean = |part: fn(&(f64, f64)) -> f64| points.iter().map(part).sum::<f64>() / count;
@@ -98,7 +98,7 @@ mod tests {
 
     #[test]
     fn a_power_above_a_floor() {
-        // 0.3 h⁴ until 1e-10, where roundings take over.
+        // 0.3 h⁴ down to 1e-10, where rounding errors dominate.
         let errors: Vec<_> = halved(14)
             .map(|h| (h, 0.3 * h.powi(4) + 1e-10 / h.sqrt().sqrt()))
             .collect();
@@ -115,7 +115,7 @@ mod tests {
         assert_eq!(floor(&errors), None);
         let found = slope(&errors, 0.0).unwrap();
         assert!((found.exponent - 2.0).abs() < 1e-12 && found.points == 6);
-        // Below the uncertainty of the reference there is nothing to fit, nor where all is lost.
+        // Below the uncertainty of the reference, and where the motion is lost, nothing can be fitted.
         assert_eq!(slope(&errors, 1.0), None);
         let lost: Vec<_> = halved(6).map(|h| (h, 0.7)).collect();
         assert_eq!((slope(&lost, 0.0), floor(&lost)), (None, None));

@@ -1,4 +1,4 @@
-//! References of one's own, with the vectors of the model's kind.
+//! References given by the user, for models of either kind of length.
 
 use super::WorkPrecision;
 use super::reference::Source;

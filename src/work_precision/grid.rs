@@ -1,34 +1,34 @@
-//! The nodes of one run.
+//! The mesh of one run.
 
 use super::error::WorkPrecisionError;
 use crate::motion::{MOST_STEPS, count_steps};
 use std::ops::Range;
 
-/// A span in equal steps; the last one may be shorter.
+/// A span divided into equal steps; the last one may be shorter.
 #[derive(Clone, Debug)]
 pub(crate) struct Grid {
     start: f64,
     end: f64,
-    /// As it was asked for, positive; the span where that is longer than it.
+    /// The step that was asked for, positive and at most the span.
     step: f64,
-    /// The length of all elements but perhaps the last, signed.
+    /// The length of all elements except possibly the last, with sign.
     length: f64,
     steps: usize,
     /// Whether the last step is as long as the others.
     whole: bool,
 }
 
-/// A node at which a run is looked at.
+/// A node at which a run is examined.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Look {
     pub(super) node: usize,
-    /// Whether the state is compared with the reference there, not only the energy with that of the start.
+    /// Whether the state is compared with the reference, in addition to the check of the energy.
     pub(super) compare: bool,
 }
 
-/// At how many nodes, equally spaced as far as the steps allow, runs are compared with the reference.
+/// The number of nodes, about equally spaced, at which runs are compared with the reference.
 const COMPARED: usize = 10;
-/// At how many nodes the energy is evaluated, at most: a fraction of the run that does not count.
+/// The largest number of nodes at which the energy is evaluated; the time for this is not measured.
 const LOOKS: usize = 1000;
 
 impl Grid {
@@ -64,7 +64,7 @@ impl Grid {
         })
     }
 
-    /// The step that was asked for, without its sign, and no longer than the span.
+    /// The step that was asked for, without sign and at most the span.
     pub(crate) fn step(&self) -> f64 {
         self.step
     }
@@ -73,7 +73,7 @@ impl Grid {
         self.steps
     }
 
-    /// The time of the k-th node: a product, not a sum, and the end of the span exactly.
+    /// The time of the k-th node: computed by a product, not a sum; the last one is exactly the end.
     pub(crate) fn node(&self, k: usize) -> f64 {
         if k >= self.steps {
             self.end
@@ -93,7 +93,7 @@ impl Grid {
         (t, next, h)
     }
 
-    /// Where the run is looked at, in the order of time; the last look is at the end.
+    /// The nodes at which the run is examined, in the order of time; the last one is the end.
     pub(super) fn looks(&self) -> Vec<Look> {
         let stride = self.steps.div_ceil(LOOKS);
         let mut looks: Vec<Look> = (1..)
@@ -104,7 +104,7 @@ impl Grid {
                 compare: false,
             })
             .collect();
-        // In f64, because products of counts may overflow.
+        // In `f64`, since products of counts may overflow.
         let part = |k: usize| self.steps as f64 * (k as f64 / COMPARED as f64);
         let compared = (1..COMPARED).map(|k| part(k).round() as usize);
         looks.extend(
@@ -121,7 +121,7 @@ impl Grid {
         looks
     }
 
-    /// The times at which it is compared with the reference.
+    /// The times at which the run is compared with the reference.
     pub(super) fn compared(&self) -> impl Iterator<Item = f64> + '_ {
         let looks = self.looks().into_iter();
         looks
@@ -154,15 +154,15 @@ mod tests {
         for (span, step) in [(0.0..1.0, 0.3), (1.0..-2.0, 0.7), (0.0..1.0, 5.0)] {
             let grid = Grid::new(&span, step).unwrap();
             let sum: f64 = (0..grid.steps()).map(|k| grid.element(k).2).sum();
-            // A rounding for each of at most five additions.
+            // One ulp for each of at most five additions.
             assert!((sum - (span.end - span.start)).abs() < 5.0 * 3.0 * f64::EPSILON);
             assert_eq!(grid.node(grid.steps()), span.end);
-            // What is plotted is a step that was made.
+            // The step that is plotted is one that was made.
             assert_eq!(grid.step(), step.min((span.end - span.start).abs()));
         }
     }
 
-    /// A rounding of the times is no step: 9 steps end a rounding behind 1e9 + 0.009, where a tenth one would have no length.
+    /// 9 steps end one ulp before 1e9 + 0.009; a tenth step would have no length.
     #[test]
     fn roundings_of_the_times_are_no_steps() {
         for (start, step) in [(1e9, 1e-3), (-1e9, 1e-3), (1.7e9, 0.01)] {

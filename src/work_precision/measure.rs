@@ -1,4 +1,4 @@
-//! One run, timed and looked at.
+//! Makes one run, timed and examined.
 
 use super::grid::Grid;
 use super::point::Measured;
@@ -13,17 +13,17 @@ use std::time::{Duration, Instant};
 use tfe_runtime::Element;
 use tfe_runtime::step::Control;
 
-/// The most repetitions of a run: the best of a hundred is not much above the best of a thousand.
+/// The largest number of repetitions of a run: the best of a hundred is close to the best of a thousand.
 const MOST_REPETITIONS: u32 = 100;
 
-/// What all runs have in common.
+/// The data common to all runs.
 pub(super) struct Measure<'a, M, S> {
     pub(super) model: &'a M,
     pub(super) start: &'a S,
     pub(super) reference: &'a Known<S>,
 }
 
-/// One way to cross the span.
+/// The element, the control and the mesh of one run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Way<'g> {
     pub(crate) element: Element,
@@ -36,7 +36,7 @@ impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
         self.model.stepper(way.element, way.control)
     }
 
-    /// Makes the run, with the clock stopped while it is looked at.
+    /// Makes a run and examines it; the clock is stopped meanwhile.
     pub(super) fn look(&self, way: Way<'_>) -> Result<Measured, RunErrorKind> {
         let (grid, mut stepper) = (way.grid, self.stepper(way)?);
         let mut observer = Observer::new(self, &mut stepper, grid.node(0));
@@ -54,13 +54,14 @@ impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
         Ok(measured)
     }
 
-    /// Makes the run without looking.
+    /// Makes a run without examining it.
     pub(super) fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind> {
         let (grid, mut state) = (way.grid, self.start.clone());
         advance::<M, S>(&mut self.stepper(way)?, grid, 0..grid.steps(), &mut state)
     }
 
-    /// Makes the run with each tolerance, the tightest first, and keeps the loosest that does not show in the error beside the tightest that is met.
+    /// Makes the run with each tolerance, the smallest first, and returns the one with the largest tolerance that does
+    /// not increase the error noticeably.
     pub(super) fn look_with(
         &self,
         way: Way<'_>,
@@ -101,21 +102,21 @@ impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
     }
 }
 
-/// By what factor the error may be larger than with the tightest tolerance.
+/// The largest increase of the error relative to the smallest tolerance.
 const SHOWS: f64 = 1.25;
 
 /// The best of several times of one run.
 #[derive(Debug)]
 pub(crate) struct Best<'a> {
-    /// Seconds of the fastest so far.
+    /// The seconds of the fastest repetition so far.
     pub(crate) seconds: &'a mut f64,
     pub(crate) repetitions: &'a mut u32,
-    /// What all of them took.
+    /// The time of all repetitions.
     pub(crate) spent: &'a mut Duration,
 }
 
 impl Best<'_> {
-    /// Repeats the run until it has taken `until` in all, or cannot be repeated.
+    /// Repeats the run until it has taken the time `until` in total, or fails.
     pub(crate) fn repeat(self, until: Duration, mut run: impl FnMut() -> Option<Duration>) {
         while *self.spent < until && *self.repetitions < MOST_REPETITIONS {
             let Some(time) = run() else {
@@ -128,7 +129,7 @@ impl Best<'_> {
     }
 }
 
-/// Moves `state` over some elements of the grid, and says how long that took.
+/// Advances `state` over some elements of the mesh; returns the computing time.
 pub(crate) fn advance<M: Subject<S>, S: PhasePoint>(
     stepper: &mut M::Stepper<'_>,
     grid: &Grid,
@@ -149,12 +150,12 @@ pub(crate) fn advance<M: Subject<S>, S: PhasePoint>(
     Ok(clock.elapsed())
 }
 
-/// What is seen of a run at its nodes.
+/// Records the errors of a run at its nodes.
 struct Observer<'a, M: Subject<S>, S: PhasePoint> {
     model: &'a M,
     reference: &'a Known<S>,
     start_energy: f64,
-    /// The largest change of it.
+    /// The largest change of the energy.
     change: f64,
     /// The largest |p·v|.
     action: f64,

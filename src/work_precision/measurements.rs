@@ -1,4 +1,4 @@
-//! All runs of a comparison.
+//! The results of a work-precision comparison.
 
 use super::fit::{self, Slope};
 use super::peer::{Peer, PeerPoint};
@@ -16,7 +16,7 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// From at least one point.
+    /// A curve of at least one point.
     pub(super) fn new(points: Vec<Point>, uncertainty: f64) -> Self {
         let (element, solve) = points.first().map_or_else(
             || (Element::mixed(2), Solve::Auto),
@@ -170,7 +170,7 @@ impl Measurements {
     ///
     /// An error below the uncertainty of the reference counts as that uncertainty.
     pub fn front(&self) -> Vec<&Point> {
-        // (cost, error, point), where both can be compared.
+        // (cost, error, point), for points with both numbers.
         let known = |point| {
             let (cost, error) = self.place(point)?;
             (cost.is_finite() && error.is_finite()).then_some((cost, error, point))
@@ -218,7 +218,7 @@ impl Measurements {
             .map(|(_, found)| found)
     }
 
-    /// Cost and error of a point, for the front.
+    /// The cost and the error of a point, for the Pareto front.
     pub(super) fn place(&self, point: &Point) -> Option<(f64, f64)> {
         let error = point.error()?;
         let uncertainty = self.reference.uncertainty();
@@ -231,7 +231,7 @@ impl Measurements {
     }
 }
 
-/// Those of (cost, error, what) that no other beats, the cheapest first.
+/// The entries (cost, error, what) that no other entry dominates, the cheapest first.
 pub(crate) fn pareto<T>(mut all: Vec<(f64, f64, T)>) -> Vec<(f64, f64, T)> {
     all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let mut least = f64::INFINITY;

@@ -1,4 +1,4 @@
-//! Measurements as files.
+//! Results written to files.
 
 use super::error::SaveError;
 use super::measurements::Measurements;
@@ -70,24 +70,24 @@ impl Report for Measurements {
     }
 }
 
-/// Results that are a table, a chart, or a section of a page.
+/// Results that can be written as a table, a chart or a page.
 pub(crate) trait Report {
     /// The title of a page.
     #[cfg(feature = "charts")]
     fn title(&self) -> &str;
 
-    /// All figures.
+    /// The table.
     fn csv(&self) -> String;
 
     /// The chart.
     #[cfg(feature = "charts")]
     fn picture(&self) -> Chart;
 
-    /// Chart and table.
+    /// The section of a page: chart and table.
     #[cfg(feature = "charts")]
     fn part(&self) -> Result<Section, ChartError>;
 
-    /// Writes what the ending of the file name asks for.
+    /// Writes the format that the ending of the file name asks for.
     fn save_as(&self, path: &Path) -> Result<(), SaveError> {
         const KNOWN: &[&str] = &[".svg", ".csv", ".html"];
         let ending = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
@@ -116,7 +116,7 @@ pub(crate) trait Report {
     }
 }
 
-/// The columns that other integrators have.
+/// A line of the table for another integrator; columns that it does not have are empty.
 fn line_of_peer(name: &str, point: &PeerPoint) -> String {
     let value = |column: &str| match (column, &point.outcome) {
         ("element", _) => quoted(name),
@@ -191,7 +191,7 @@ fn figures(measured: &Measured) -> Vec<String> {
     fields
 }
 
-/// In the shortest form that reads back exactly.
+/// A number in the shortest form that reads back exactly.
 pub(crate) fn number(value: f64) -> String {
     if value.is_finite() {
         format!("{value:?}")
@@ -200,7 +200,7 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// A text that may hold commas.
+/// A text that may contain commas, quoted.
 pub(crate) fn quoted(text: &str) -> String {
     format!("\"{}\"", text.replace('"', "\"\"").replace('\n', " "))
 }

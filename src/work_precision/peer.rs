@@ -1,4 +1,4 @@
-//! Curves of other integrators.
+//! Curves of other integrators, for comparison.
 
 use super::measure::Best;
 use super::point::Cost;
@@ -94,10 +94,10 @@ impl PeerMeasured {
     }
 }
 
-/// A run of another integrator with one setting.
+/// Makes a run of another integrator with one setting.
 type Run<'m, S> = dyn Fn(f64) -> Result<PeerRun<S>, Box<dyn Error>> + 'm;
 
-/// Another integrator, not run yet.
+/// Another integrator that was not run yet.
 pub(super) struct Rival<'m, S> {
     pub(super) name: String,
     pub(super) settings: Vec<f64>,
@@ -105,7 +105,7 @@ pub(super) struct Rival<'m, S> {
 }
 
 impl<S: PhasePoint> Rival<'_, S> {
-    /// The first run with each setting.
+    /// Makes the first run with each setting.
     pub(super) fn look(&self, reference: &Known<S>, end: f64) -> Peer {
         let point = |setting: &f64| PeerPoint {
             setting: *setting,
@@ -148,7 +148,7 @@ impl<S: PhasePoint> Rival<'_, S> {
         Ok(measured)
     }
 
-    /// Repeats all runs until each of them has taken `until` in all, of which `spent` was before.
+    /// Repeats all runs until each of them has taken the time `until` in total, including `spent`.
     pub(super) fn repeat(&self, peer: &mut Peer, spent: &mut [Duration], until: Duration) {
         for (point, spent) in peer.points.iter_mut().zip(spent) {
             let Ok(measured) = &mut point.outcome else {
@@ -159,7 +159,7 @@ impl<S: PhasePoint> Rival<'_, S> {
                 repetitions: &mut measured.repetitions,
                 spent,
             };
-            // It has run before, with the same setting.
+            // The same run succeeded before.
             best.repeat(until, || (self.run)(point.setting).ok().map(|run| run.time));
         }
     }

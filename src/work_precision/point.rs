@@ -1,4 +1,4 @@
-//! One run: what it cost, and how far off it was.
+//! The cost and the error of one run.
 
 use crate::error::RunErrorKind;
 use crate::numbers::larger;

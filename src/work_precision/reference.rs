@@ -1,4 +1,4 @@
-//! What runs are compared with.
+//! The reference with which runs are compared.
 
 use super::error::WorkPrecisionError;
 use super::grid::Grid;
@@ -61,7 +61,7 @@ impl fmt::Display for Reference {
 /// The exact state at a time.
 type Function<'m, S> = dyn Fn(f64) -> S + 'm;
 
-/// Where the reference comes from.
+/// The source of the reference.
 pub(super) enum Source<'m, S> {
     Computed,
     End(S),
@@ -111,7 +111,7 @@ impl Scale {
 }
 
 fn norm(values: &[f64]) -> f64 {
-    // Scaled, so that squares neither overflow nor vanish.
+    // Scaled first, so that squares neither overflow nor underflow.
     let largest = values.iter().fold(0.0, |so_far: f64, value| {
         if value.abs() <= so_far {
             so_far
@@ -127,7 +127,7 @@ fn norm(values: &[f64]) -> f64 {
 }
 
 impl<S: PhasePoint> Known<S> {
-    /// The relative error at the end that even the exact motion would seem to have.
+    /// The relative error at the end that the exact motion would seem to have.
     pub(super) fn uncertainty(&self) -> f64 {
         self.summary.uncertainty()
     }
@@ -158,7 +158,7 @@ impl<S: PhasePoint> Known<S> {
 }
 
 impl<S: PhasePoint> Source<'_, S> {
-    /// The reference at all times at which the grids are looked at.
+    /// Computes the reference at all times at which runs on the meshes are compared with it.
     pub(super) fn find<M: Subject<S>>(
         &self,
         model: &M,
@@ -192,7 +192,7 @@ impl<S: PhasePoint> Source<'_, S> {
     }
 }
 
-/// Refuses a state of a reference that cannot be compared with those of the model.
+/// Refuses a state of a given reference whose size differs from that of the model, or that is not finite.
 fn check<S: PhasePoint>(time: f64, state: &S, expected: usize) -> Result<(), WorkPrecisionError> {
     for (vector, values) in [("q", state.q()), ("p", state.p())] {
         let length = values.len();
@@ -211,7 +211,7 @@ fn check<S: PhasePoint>(time: f64, state: &S, expected: usize) -> Result<(), Wor
     Ok(())
 }
 
-/// The times at which any of the grids is compared, in the order in which a run meets them.
+/// The times at which any of the runs is compared, in the order of the runs.
 fn times(grids: &[Grid]) -> Vec<f64> {
     let mut times: Vec<f64> = grids.iter().flat_map(Grid::compared).collect();
     times.sort_by(f64::total_cmp);
@@ -221,7 +221,7 @@ fn times(grids: &[Grid]) -> Vec<f64> {
         if end < grid.node(0) {
             times.reverse();
         }
-        // Of times that are the same, the end is the one that stays.
+        // Of times that differ by rounding only, the end is kept.
         if let Some(last) = times.last_mut() {
             *last = end;
         }
@@ -229,7 +229,7 @@ fn times(grids: &[Grid]) -> Vec<f64> {
     times
 }
 
-/// A run with half the step, and half of that, until it no longer changes.
+/// Makes runs with halved steps, until the result no longer changes.
 fn computed<M: Subject<S>, S: PhasePoint>(
     model: &M,
     start: (f64, &S),
@@ -253,7 +253,7 @@ fn computed<M: Subject<S>, S: PhasePoint>(
     );
     let settled = settled.map_err(|failure| match failure {
         Some(kind) => WorkPrecisionError::ReferenceRun(kind),
-        // Two runs end the loop at the earliest, and one of them failed if there was nothing to compare.
+        // The loop makes at least two runs; if there is nothing to compare, one of them failed.
         None => WorkPrecisionError::NoSteps,
     })?;
     Ok(Known {
@@ -267,18 +267,18 @@ fn computed<M: Subject<S>, S: PhasePoint>(
     })
 }
 
-/// How far a step is halved for a run that others are compared with.
+/// The parameters of step halving for a reference run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Halving {
     /// The first step.
     pub(crate) longest: f64,
-    /// No step is shorter.
+    /// The shortest step.
     pub(crate) least: f64,
-    /// Two runs that agree so well are enough.
+    /// The difference of two runs at which the halving ends.
     pub(crate) enough: f64,
 }
 
-/// A run that no longer changes as its step is halved, or changes least.
+/// The reference run: one that no longer changes, or changes least, when its step is halved.
 #[derive(Clone, Debug)]
 pub(crate) struct Settled<T> {
     pub(crate) run: T,
@@ -288,16 +288,17 @@ pub(crate) struct Settled<T> {
 }
 
 impl Halving {
-    /// Runs with the first step halved 0, 1, 2, … times, until two of them agree or no longer approach each other: the finer one of the two
-    /// that agree best; else the last failure, if any run failed.
+    /// Makes runs with the first step halved 0, 1, 2, … times, until two of them agree or no longer approach each
+    /// other. Returns the finer one of the two that agree best; if there are no two, the last error.
     pub(crate) fn settle<T: Clone>(
         self,
         mut run: impl FnMut(u32) -> Result<T, RunErrorKind>,
         distance: impl Fn(&T, &T) -> f64,
     ) -> Result<Settled<T>, Option<RunErrorKind>> {
-        /// Below it, a difference that no longer falls is one of roundings; above it, the motion is not resolved yet.
+        /// Below this, a difference that no longer decreases is rounding error; above it, the motion is not resolved
+        /// yet.
         const RESOLVED: f64 = 1e-6;
-        /// Of steps so different that this is not enough, the longest are not worth a comparison.
+        /// The largest number of halvings. If this is not enough, the longest steps are too long to be compared.
         const MOST_HALVINGS: u32 = 24;
         let (mut last, mut failure) = (None, None);
         let mut best: Option<Settled<T>> = None;
@@ -333,7 +334,8 @@ impl Halving {
     }
 }
 
-/// Of steps that are never cut: those that are all have the same pieces, and runs that agree because of that prove nothing.
+/// The control for steps that are never cut: cut steps have the same pieces in both runs, which then agree whatever
+/// their error.
 pub(crate) fn uncut() -> Control {
     Control {
         solve: Solve::Trusting,
@@ -352,8 +354,8 @@ fn difference<S: PhasePoint>(scale: Scale, a: &[S], b: &[S]) -> f64 {
     }
 }
 
-/// The states at all times, with steps of this size at most, cut in half so many times. Every step is: where the times leave only short
-/// steps, a run with a shorter limit would be the same run, and prove nothing.
+/// The states at all times, with steps of at most a given size, each halved a number of times. Halving applies to every
+/// step: if the times to be met are so dense that they limit all steps, a smaller limit would not change the run.
 fn run<M: Subject<S>, S: PhasePoint>(
     model: &M,
     element: Element,

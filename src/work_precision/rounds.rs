@@ -1,6 +1,7 @@
-//! Runs taken in turn.
+//! Repeats runs in turn for timing.
 //!
-//! A processor is not equally fast at all times. Of runs that are repeated in turn, none has all of its repetitions in a slow moment.
+//! The speed of a processor varies with time. If runs are repeated in turn, no run has all its repetitions in a slow
+//! period.
 
 use super::measure::{Best, Measure, Way};
 use super::peer::{Peer, Rival};
@@ -10,10 +11,10 @@ use super::subject::{PhasePoint, Subject};
 use std::time::Duration;
 use tfe_runtime::step::Control;
 
-/// How often all runs have their turn after the first.
+/// The number of rounds after the first.
 pub(crate) const ROUNDS: u32 = 4;
 
-/// A point of a curve, which may be repeated.
+/// A point of a curve, whose run can be repeated.
 pub(super) struct Timed<'g> {
     pub(super) point: Point,
     way: Way<'g>,
@@ -21,7 +22,7 @@ pub(super) struct Timed<'g> {
 }
 
 impl<'g> Timed<'g> {
-    /// The first run.
+    /// Makes the first run.
     pub(super) fn look<M: Subject<S>, S: PhasePoint>(
         measure: &Measure<'_, M, S>,
         way: Way<'g>,
@@ -54,7 +55,7 @@ impl<'g> Timed<'g> {
         }
     }
 
-    /// Repeats the run until it has taken `until` in all.
+    /// Repeats the run until it has taken the time `until` in total.
     fn repeat<M: Subject<S>, S: PhasePoint>(
         &mut self,
         measure: &Measure<'_, M, S>,
@@ -68,12 +69,12 @@ impl<'g> Timed<'g> {
             repetitions: &mut measured.repetitions,
             spent: &mut self.spent,
         };
-        // It has run before, from the same start.
+        // The same run succeeded before.
         best.repeat(until, || measure.time(self.way).ok());
     }
 }
 
-/// Repeats all runs in turn, each for `repeat_for` in all.
+/// Repeats all runs in turn, each for `repeat_for` in total.
 pub(super) fn repeat<M: Subject<S>, S: PhasePoint>(
     measure: &Measure<'_, M, S>,
     curves: &mut [Vec<Timed<'_>>],
@@ -99,7 +100,7 @@ pub(super) fn repeat<M: Subject<S>, S: PhasePoint>(
     }
 }
 
-/// All rivals, each run once.
+/// Runs all other integrators once.
 pub(super) fn look_at_peers<S: PhasePoint>(
     rivals: &[Rival<'_, S>],
     reference: &Known<S>,

@@ -1,6 +1,6 @@
-//! What is measured: models of fixed size and of run-time length, behind one interface.
+//! The models that are measured, of fixed size and of run-time length, behind one interface.
 //!
-//! Everything is resolved at compile time: the steps that are timed are those that a simulation of the same model makes.
+//! The interface is resolved at compile time, so that the timed steps are the same as in a simulation of the model.
 
 use crate::error::{RunError, RunErrorKind};
 use crate::numbers::raise;
@@ -76,25 +76,25 @@ impl<M: Steppable<S>, S: PhasePoint> Subject<S> for M {}
 
 /// How a model is stepped and evaluated; internal.
 pub trait Steppable<S> {
-    /// What makes the steps.
+    /// The type that makes the steps.
     type Stepper<'m>
     where
         Self: 'm;
 
-    /// The velocities of the last look.
+    /// The velocities found last, as first guesses.
     type Velocity: AsRef<[f64]>;
 
-    /// Whether there are constraints.
+    /// Whether the model has constraints.
     const CONSTRAINED: bool;
 
-    /// A stepper at rest.
+    /// Creates a stepper without first guesses.
     fn stepper(
         &self,
         element: Element,
         control: Control,
     ) -> Result<Self::Stepper<'_>, RunErrorKind>;
 
-    /// Moves the state from t to t + h.
+    /// Advances the state from t to t + h.
     fn advance(
         stepper: &mut Self::Stepper<'_>,
         t: f64,
@@ -102,13 +102,14 @@ pub trait Steppable<S> {
         state: &mut S,
     ) -> Result<(), StepError>;
 
-    /// What the steps so far have cost.
+    /// The work of the steps so far.
     fn statistics(stepper: &Self::Stepper<'_>) -> Statistics;
 
     /// Velocities of zero.
     fn rest(&self) -> Self::Velocity;
 
-    /// The energy; NaN where the momentum belongs to no velocity. Keeps the velocity, zeros where there is none.
+    /// The energy; NaN if no velocity belongs to the momentum. Keeps the velocity as the next guess; zeros if there is
+    /// none.
     fn energy(
         &self,
         stepper: &mut Self::Stepper<'_>,
@@ -123,10 +124,10 @@ pub trait Steppable<S> {
     /// The names of the outputs, in order.
     fn output_names(&self) -> Result<Vec<String>, RunErrorKind>;
 
-    /// The outputs at a state, in that order; NaN where they need a velocity and the momentum belongs to none.
+    /// The outputs at a state, in that order; NaN if they need a velocity and none belongs to the momentum.
     fn outputs(&self, stepper: &mut Self::Stepper<'_>, t: f64, state: &S) -> Vec<f64>;
 
-    /// Refuses a start from which no simulation makes the step `over`.
+    /// Refuses a start at which no simulation can begin with a step over `over`.
     fn check_start(&self, start: &S, over: Range<f64>, h: f64) -> Result<(), RunErrorKind>;
 }
 
@@ -146,7 +147,7 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
         control: Control,
     ) -> Result<Stepper<'_, M, N>, RunErrorKind> {
         let stepper = Stepper::new(self, element, control);
-        // Nobody asks what is inside an element: linear models step by a matrix where that pays.
+        // The inside of elements is not needed, so that linear models may step by a matrix.
         stepper
             .map(Stepper::ends_only)
             .map_err(RunErrorKind::Element)
@@ -223,7 +224,7 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
             Err(kind @ (RunErrorKind::Start { .. } | RunErrorKind::Inconsistent { .. })) => {
                 Err(kind.clone())
             }
-            // Only the checks before the step count.
+            // Only the checks before the step matter.
             _ => Ok(()),
         }
     }
@@ -272,7 +273,7 @@ impl<M: family::Model> Steppable<FamilyState> for M {
         state: &FamilyState,
         velocity: &mut Vec<f64>,
     ) -> f64 {
-        // The stepper keeps the ordering of the mass matrix from one look to the next.
+        // The stepper keeps the ordering of the mass matrix between evaluations.
         match stepper.velocity(t, state) {
             Ok(found) => {
                 *velocity = found;
@@ -290,7 +291,7 @@ impl<M: family::Model> Steppable<FamilyState> for M {
     }
 
     fn output_names(&self) -> Result<Vec<String>, RunErrorKind> {
-        // Sites may be counted by lists that are too short.
+        // The number of sites may exceed the length of a list.
         self.check().map_err(RunErrorKind::Family)?;
         let columns = 0..self.columns();
         Ok(columns.map(|at| self.column_name(at).to_string()).collect())
@@ -329,14 +330,14 @@ impl<M: family::Model> Steppable<FamilyState> for M {
     }
 }
 
-/// Whether a run of a family failed because of model or start.
+/// Whether a run of a family failed because of its model or its start.
 fn refuses(kind: &RunErrorKind) -> bool {
     matches!(
         kind,
         RunErrorKind::Start { .. }
             | RunErrorKind::Family(_)
             | RunErrorKind::Solve {
-                // Found by the first step: fixed-size models say `Inconsistent` before it.
+                // Found by the first step; models of fixed size report `Inconsistent` before it.
                 source: StepError::Constraint(ConstraintError::Start { .. }),
                 element: 0,
                 ..

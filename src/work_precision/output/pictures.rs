@@ -1,4 +1,4 @@
-//! Charts and sections of pages.
+//! Charts and sections of pages for work-precision diagrams.
 
 use crate::charts::{Axis, Chart, ChartError, Scale, Section, Style};
 use crate::numbers::larger;
@@ -6,7 +6,7 @@ use crate::work_precision::peer::{PeerMeasured, PeerPoint};
 use crate::work_precision::point::Measured;
 use crate::work_precision::{Curve, Measurements, Point};
 
-/// Errors of zero are drawn here: half a rounding.
+/// The value at which errors of zero are drawn: half an ulp.
 const LEAST: f64 = 0.5 * f64::EPSILON;
 
 impl Measurements {
@@ -63,7 +63,7 @@ impl Measurements {
         chart
     }
 
-    /// The axis of errors. Runs that blew up without failing would press all others into a line.
+    /// The axis of errors, limited so that runs that diverged without failing do not compress all others.
     fn errors(&self, axis: Axis) -> Axis {
         const LOST: f64 = 10.0;
         let errors = || {
@@ -156,7 +156,7 @@ impl Measurements {
         with_failures(name, curve.failed())
     }
 
-    /// Where errors are too small to be told.
+    /// The region where errors are below the uncertainty of the reference.
     fn below_reference(&self) -> Vec<(f64, f64)> {
         let ours = self.points().filter_map(Point::measured);
         let ours = ours.filter(|one| one.at_reference_floor);
@@ -169,7 +169,7 @@ impl Measurements {
         ours.chain(peers).collect()
     }
 
-    /// The front as steps: at every cost the least error so far.
+    /// The Pareto front as a step function: the least error up to each cost.
     fn steps_of_front(&self) -> Vec<(f64, f64)> {
         let mut line = Vec::new();
         let mut last = None;
