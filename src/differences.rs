@@ -1,38 +1,43 @@
-//! Central differences, where a derivative cannot be had otherwise.
+//! Derivatives by central differences, for functions without exact derivatives.
 
-/// Weights of values at ±1, ±2 and ±3 distances: of sixth order.
+/// Weights of the values at ±1, ±2 and ±3 steps, sixth order.
 pub(crate) const SIXTH: [f64; 3] = [45.0 / 60.0, -9.0 / 60.0, 1.0 / 60.0];
 
-/// Weights of values at ±1 … ±4 distances: of eighth order.
+/// Weights of the values at ±1 … ±4 steps, eighth order.
 const EIGHTH: [f64; 4] = [4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0];
 
-/// What a difference of eighth order moves of whatever moves most, as a part of its size: roundings of 1e-15 leave some 1e-12 of a derivative, and what higher derivatives leave is less.
+/// The step of an eighth-order difference, relative to the scale on which the fastest quantity changes. A rounding
+/// error of 1e-15 gives an error of about 1e-12 of the derivative, and the truncation error is smaller.
 pub(crate) const PART: f64 = 4e-3;
 
-/// How near two orders of a derivative have to be for no shorter distance to be tried.
+/// The relative difference of two orders below which no shorter step is tried.
 pub(crate) const WELL_KNOWN: f64 = 1e-9;
 
-/// The distances that are tried, in parts of the first.
+/// The steps that are tried, relative to the first.
 pub(crate) const NEARER: [f64; 3] = [1.0, 0.25, 0.0625];
 
-/// Whether nothing sees the size of a parameter, as of a drag of 1e-20: all of it moves something of some size by so little that parts of it change that by roundings.
+/// Whether the value of a parameter is so small that its relative changes have no effect, as a drag coefficient of
+/// 1e-20: setting it to zero would change a quantity of the given size by `moved`, and fractions of this are rounding
+/// errors.
 pub(crate) fn is_next_to_zero(parameter: f64, (moved, size): (f64, f64)) -> bool {
     const SEEN: f64 = 1e-4;
 
     parameter != 0.0 && moved <= SEEN * size
 }
 
-/// Weights of values at ±1 and ±2 distances: of fourth order.
+/// Weights of the values at ±1 and ±2 steps, fourth order.
 const FOURTH: [f64; 2] = [8.0 / 12.0, -1.0 / 12.0];
 
-/// A derivative at zero by differences of sixth order over a distance; a shorter one where fourth order gives something else, as of a function that changes much within it.
+/// The derivative at zero by sixth-order differences; the step is reduced if fourth order disagrees, as for a function
+/// that varies much within it.
 pub(crate) fn derivative(distance: f64, f: impl FnMut(f64) -> f64) -> f64 {
     estimated(distance, f).1
 }
 
-/// The same over a long distance, which serves functions that hold numbers of the size of one beside a small value, or over a short one, a part of that value, where roundings leave less of it.
+/// The same with a long step, suited to functions that add numbers of order one to a small argument, or with a short
+/// one, a fraction of that argument, whichever has the smaller rounding error.
 pub(crate) fn derivative_of_either([long, short]: [f64; 2], mut f: impl FnMut(f64) -> f64) -> f64 {
-    /// What an error is less than, as a part of the derivative, where that is more than roundings.
+    /// The largest estimated relative error of a derivative that is more than rounding error.
     const KNOWN: f64 = 1e-3;
 
     let (error, slope) = estimated(long, &mut f);
@@ -41,7 +46,7 @@ pub(crate) fn derivative_of_either([long, short]: [f64; 2], mut f: impl FnMut(f6
         return slope;
     }
     let (nearer_error, nearer) = estimated(short, f);
-    // As parts: a function that goes up and down within the long distance has small differences there.
+    // Relative to the derivative: for a function that oscillates within the long step, absolute differences are small.
     let (part, nearer_part) = (error / slope.abs(), nearer_error / nearer.abs());
     let is_better = nearer_part < KNOWN && nearer_part < part;
     if is_better || !slope.is_finite() {
@@ -51,7 +56,8 @@ pub(crate) fn derivative_of_either([long, short]: [f64; 2], mut f: impl FnMut(f6
     }
 }
 
-/// The nearest distance from a time to one that there is, and at least to the next: beside large times distances are rounded, and with them differences.
+/// The step closest to a given one that is exact at a time, at least one ulp of the time: at large times steps are
+/// rounded, and so are differences.
 pub(crate) fn resolved(distance: f64, time: f64) -> f64 {
     let moved = (time + distance) - time;
     if moved == 0.0 {
@@ -61,20 +67,21 @@ pub(crate) fn resolved(distance: f64, time: f64) -> f64 {
     }
 }
 
-/// The derivative of a function by the time, however fast the function changes. Distances, the first of them at times about one `first`, grow shorter until two that follow each other say the same:
-/// one by itself may be a multiple of a period of the function, which seems to be constant then.
+/// The derivative of a function of time that may vary on any time scale. Steps, the first of which is about `first`
+/// near time one, decrease until two successive ones agree: a single one may be a multiple of the period of the
+/// function, which would then seem constant.
 pub(crate) fn derivative_by_time(first: f64, time: f64, f: &mut dyn FnMut(f64) -> f64) -> f64 {
-    /// The next one, as a part of the one before: no simple part either.
+    /// The ratio of successive steps; not a simple fraction either.
     const NEXT: f64 = 0.291;
-    /// Down to some 1e-12 of the first.
+    /// Down to about 1e-12 of the first step.
     const TRIALS: i32 = 24;
-    /// How near to each other two derivatives are that say the same.
+    /// The relative difference of two derivatives that agree.
     const SAME: f64 = 1e-6;
 
     if !time.is_finite() {
         return f64::NAN;
     }
-    // Beside large times those within a function are rounded.
+    // At large times the argument is rounded inside the function.
     let first = first * time.abs().max(1.0).cbrt();
     let (mut known, mut best) = (None, (f64::INFINITY, f64::NAN));
     for shorter in 0..TRIALS {
@@ -97,7 +104,7 @@ pub(crate) fn derivative_by_time(first: f64, time: f64, f: &mut dyn FnMut(f64) -
     best.1
 }
 
-/// A derivative at zero by differences of sixth order, how far that of fourth order is off, and what roundings of the function may leave.
+/// The derivative at zero by sixth-order differences, its difference from fourth order, and its rounding error.
 struct Difference {
     sixth: f64,
     off: f64,
@@ -106,7 +113,7 @@ struct Difference {
 
 impl Difference {
     fn over(distance: f64, mut f: impl FnMut(f64) -> f64) -> Self {
-        /// Roundings of a function, of which the differences of both orders are made.
+        /// The relative rounding error of a function that is assumed in differences.
         const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
 
         let mut largest = 0.0_f64;
@@ -132,9 +139,9 @@ impl Difference {
     }
 }
 
-/// An estimate of the error of a derivative, and the derivative.
+/// An error estimate of a derivative, and the derivative.
 fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
-    /// Distances that are tried, each a quarter of the one before: down to 1e-12 of the first.
+    /// The number of steps that are tried, each a quarter of the previous one, down to 1e-12 of the first.
     const SHORTER: i32 = 20;
 
     let mut best = (f64::INFINITY, f64::NAN);
@@ -155,7 +162,8 @@ fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
     best
 }
 
-/// Where a function is evaluated, and what the value there counts in the derivative of eighth order and in that of sixth.
+/// A point at which the function is evaluated, with the weights of the value in the derivatives of eighth and of sixth
+/// order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) shift: f64,
@@ -163,7 +171,7 @@ pub(crate) struct Place {
     pub(crate) sixth: f64,
 }
 
-/// The places of differences over a distance.
+/// The points of differences with a given step.
 pub(crate) fn places(distance: f64) -> impl Iterator<Item = Place> {
     let sixth = SIXTH.into_iter().chain([0.0]);
     (1..)
@@ -212,7 +220,7 @@ mod tests {
         assert!(derivative(2e-3, |_| f64::NAN).is_nan());
     }
 
-    /// Waves of a second and of a microsecond, early and at 1e9 s; and a jump that is nearer than any usual distance.
+    /// Waves of a second and of a microsecond, at early times and at 1e9 s; and a jump closer than any usual step.
     #[test]
     fn derivatives_by_the_time_are_those_of_its_own_scale() {
         let pi = std::f64::consts::PI;
@@ -221,7 +229,7 @@ mod tests {
             (1.0, 1e9 + 0.5, 1e-9),
             (500.0 * pi, 0.3, 1e-10),
             (2e6 * pi, 3.2e-7, 1e-9),
-            // Of the phase 3e6 some 3e-10 are rounded.
+            // The phase 3e6 has a rounding error of about 3e-10.
             (2e6 * pi, 0.5, 1e-6),
             (1e-3, 7e3, 1e-8),
         ] {
@@ -233,7 +241,7 @@ mod tests {
         for (ahead, slope) in [(1e-5, 1.0), (1e-9, 1.0), (-1e-9, 3.0)] {
             let bent = |t: f64| if t < 1.0 { t } else { 5.0 + 3.0 * t };
             let found = derivative_by_time(1.570_796e-4, 1.0 - ahead, &mut |t| bent(t));
-            // Over 1e-10 the roundings of a number of eight leave 1e-5.
+            // With the step 1e-10, the rounding error of a number close to eight gives 1e-5.
             assert!((found - slope).abs() < 1e-4, "{found} for {slope}");
         }
         let constant = |time: f64, value: f64| derivative_by_time(1e-3, time, &mut |_| value);

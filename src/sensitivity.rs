@@ -59,19 +59,20 @@ pub struct Sensitive<const N: usize, L: Length<N> = FixedLength> {
     motion: Motion<N, L>,
     parameters: Vec<String>,
     nodes: Vec<Slopes>,
-    /// Between the nodes, where that is kept.
+    /// The derivatives between the nodes, if they were kept.
     inside: Vec<Inside>,
     events: Vec<(usize, Vec<f64>)>,
 }
 
-/// The derivatives at a node: a column for each of the 2N numbers of the start, ordered (p, q), then for each parameter.
+/// The derivatives at a node: a column for each of the 2N components of the start, in the order (p, q), then for each
+/// parameter.
 #[derive(Clone, Debug)]
 pub(crate) struct Slopes {
-    /// Of (p, q).
+    /// The derivatives of (p, q).
     pub(crate) state: DMatrix<f64>,
-    /// Of velocities.
+    /// The derivatives of the velocities.
     pub(crate) velocity: DMatrix<f64>,
-    /// Of outputs.
+    /// The derivatives of the outputs.
     pub(crate) outputs: DMatrix<f64>,
 }
 
@@ -91,12 +92,12 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         }
     }
 
-    /// The same with derivatives between the nodes.
+    /// Adds derivatives between the nodes.
     pub(crate) fn with_inside(self, inside: Vec<Inside>) -> Self {
         Self { inside, ..self }
     }
 
-    /// The derivatives along the elements, and their pieces, where that is kept.
+    /// The derivatives along the elements, or their pieces, if they were kept.
     pub(crate) fn inside(&self) -> &[Inside] {
         &self.inside
     }
@@ -142,7 +143,7 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         ByStart { of: self }
     }
 
-    /// An output at a node, with its derivatives by the parameters and by the start, ordered (p, q).
+    /// An output at a node, with its derivatives by the parameters and by the start, in the order (p, q).
     #[cfg(feature = "fit")]
     pub(crate) fn output_at(&self, node: usize, output: usize) -> (f64, Vec<f64>, Vec<f64>) {
         let values = self.motion.outputs().row(node);
@@ -151,7 +152,7 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         self.parted(value.unwrap_or(f64::NAN), slopes, output)
     }
 
-    /// The same of a coordinate.
+    /// The same for a coordinate.
     #[cfg(feature = "fit")]
     pub(crate) fn coordinate_at(&self, node: usize, a: usize) -> (f64, Vec<f64>, Vec<f64>) {
         let value = self.motion.states()[node].q.as_ref()[a];
@@ -165,22 +166,22 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         (value, by_parameters.to_vec(), by_start.to_vec())
     }
 
-    /// The derivatives of (p, q) at a node, a column for each number of the start and each parameter.
+    /// The derivatives of (p, q) at a node, a column for each component of the start and each parameter.
     pub(crate) fn state_slopes(&self, node: usize) -> &DMatrix<f64> {
         &self.nodes[node].state
     }
 
-    /// The derivatives of the time of the last node, where an event has stopped the run.
+    /// The derivatives of the time of the last node, if an event has stopped the run.
     pub(crate) fn end_times(&self) -> Option<&[f64]> {
         let (_, times) = self.events.last()?;
         self.motion.is_stopped().then_some(times)
     }
 
-    /// The derivatives of (p, q) and of velocities at a time of the motion, those before it at an event.
+    /// The derivatives of (p, q) and of the velocities at a time of the motion; at an event, those before it.
     fn between(&self, time: f64) -> Result<Between, AtError> {
         self.motion.at(time)?;
         if self.moves(time) {
-            // Those of the node are of the event, wherever it is.
+            // The derivatives at the node include the motion of the event in time; here the time is fixed.
             let mut inside = self.inside.iter();
             match inside.find(|inside| inside.times.1 == time) {
                 Some(before) => return Ok(before.at(time)),
@@ -204,7 +205,7 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
             .ok_or(AtError::NotRecorded { time })
     }
 
-    /// Whether this is the time of an event, which moves.
+    /// Whether this is the time of an event, which depends on the start and the parameters.
     fn moves(&self, time: f64) -> bool {
         let events = self.motion.events();
         let mut own = self.events.iter().filter_map(|(at, _)| events.get(*at));
@@ -216,7 +217,7 @@ impl<const N: usize, L: Length<N>> Sensitive<N, L> {
         self.nodes.last().expect("a run is recorded from its start")
     }
 
-    /// The row of an output.
+    /// The index of an output.
     fn output(&self, name: &str) -> Option<usize> {
         let names = self.motion.outputs().names();
         names.iter().position(|own| own.is(name))

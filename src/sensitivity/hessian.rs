@@ -17,7 +17,7 @@ pub struct LossHessian<const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> LossHessian<N, L> {
-    /// From derivatives of the gradient, a column for each parameter, and what is known of their errors.
+    /// From the derivatives of the gradient, a column for each parameter, and their error estimates.
     pub(crate) fn new(
         (value, gradient): (f64, LossGradient<N, L>),
         names: Vec<String>,

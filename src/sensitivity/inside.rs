@@ -4,17 +4,18 @@ use nalgebra::{DMatrix, RowDVector};
 use tfe_runtime::basis::{MAX_NODES, legendre, legendre_integrals};
 use tfe_runtime::{InsideLoss, InsideSlopes};
 
-/// Where an element begins: what its own derivatives are multiplied with.
+/// The derivatives at the start of an element, with which its own derivatives are multiplied.
 #[derive(Clone, Debug)]
 pub(crate) struct Before {
-    /// Of (p, q), a column for each number of the start of the run and for each parameter.
+    /// The derivatives of (p, q), a column for each component of the start of the run and for each parameter.
     pub(crate) state: DMatrix<f64>,
-    /// Of its time, where that moves.
+    /// The derivatives of the start time, if it is the time of an event.
     pub(crate) start: Option<Vec<f64>>,
 }
 
 impl Before {
-    /// Rows by the start of an element and by its directions (parameters, its start in time, its end) as rows by the start of the run and by parameters; `ends` says how its end moves.
+    /// Transforms rows of derivatives by the start of an element and its directions (parameters, its start time, its
+    /// end) into derivatives by the start of the run and by parameters; `ends` are the derivatives of the end time.
     pub(crate) fn through(&self, rows: &DMatrix<f64>, ends: Option<&[f64]>) -> DMatrix<f64> {
         let (size, columns) = self.state.shape();
         let parameters = columns - size;
@@ -36,48 +37,49 @@ impl Before {
 #[derive(Clone, Debug)]
 pub(crate) struct Inside {
     pub(crate) times: (f64, f64),
-    /// Between the times, to the digits of the step.
+    /// The length, to the full digits of the step.
     pub(crate) length: f64,
-    /// By the start of the element and by its directions.
+    /// The derivatives by the start of the element and by its directions.
     pub(crate) slopes: InsideSlopes,
     pub(crate) before: Before,
-    /// How the end of the element moves.
+    /// The derivatives of the end time of the element, if it is the time of an event.
     pub(crate) ends: Option<Vec<f64>>,
-    /// How the piece does, where events move it.
+    /// The motion of the piece in time, if events move it.
     pub(crate) moved: Option<Moved>,
 }
 
-/// How an element moves in time.
+/// The motion of an element in time.
 #[derive(Clone, Debug)]
 pub(crate) struct Moved {
-    /// Derivatives of its start and of its end.
+    /// The derivatives of its start time and of its end time.
     pub(crate) ends: [RowDVector<f64>; 2],
-    /// The coefficients themselves.
+    /// The coefficients of the polynomial.
     pub(crate) values: Vec<f64>,
 }
 
 impl Moved {
-    /// The derivative of the time at a part of the element.
+    /// The derivative of the time at a fraction of the element.
     pub(crate) fn time(&self, tau: f64) -> RowDVector<f64> {
         &self.ends[0] * (1.0 - tau) + &self.ends[1] * tau
     }
 
-    /// The derivative of its length.
+    /// The derivative of the length.
     pub(crate) fn length(&self) -> RowDVector<f64> {
         &self.ends[1] - &self.ends[0]
     }
 }
 
-/// The derivatives of a place.
+/// The derivatives at a time.
 pub(crate) struct Between {
-    /// Of (p, q).
+    /// The derivatives of (p, q).
     pub(crate) state: DMatrix<f64>,
-    /// Of the slope of the polynomial of q.
+    /// The derivatives of the time derivative of the polynomial of q.
     pub(crate) velocity: DMatrix<f64>,
 }
 
 impl Inside {
-    /// Of an element whose derivatives by the start of the run and by parameters are known: of (p, q) where it begins, and of its coefficients.
+    /// An element with known derivatives by the start of the run and by parameters: those of (p, q) at its start, and
+    /// those of its coefficients.
     #[cfg(feature = "sparse")]
     pub(crate) fn whole(
         times: (f64, f64),
@@ -107,7 +109,7 @@ impl Inside {
         self.before.state.nrows() / 2
     }
 
-    /// The columns of what is not multiplied yet.
+    /// The number of columns before multiplication.
     fn width(&self) -> usize {
         self.slopes.start.len() / (2 * self.coordinates())
     }
@@ -120,7 +122,7 @@ impl Inside {
         self.before.through(rows, self.ends.as_deref())
     }
 
-    /// Adds Σ weight_m C_m of the coordinates, or of the momenta, to rows from a first one on.
+    /// Adds Σ weight_m C_m of the coordinates, or of the momenta, to rows from `first` on.
     fn add_weighted(
         &self,
         momenta: bool,
@@ -138,7 +140,7 @@ impl Inside {
         }
     }
 
-    /// Of (p, q) at a part τ of the element, which moves in time as the element does.
+    /// The derivatives of (p, q) at a fraction τ of the element, including the motion of the element in time.
     fn at_part(&self, tau: f64) -> DMatrix<f64> {
         let n = self.coordinates();
         let mut integrals = [0.0; MAX_NODES];
@@ -149,7 +151,7 @@ impl Inside {
         self.through(&state)
     }
 
-    /// What a loss of the polynomial is, times the derivatives along it: one number a column.
+    /// The derivatives of a loss of the polynomial along the element: one number for each column.
     pub(crate) fn product(&self, loss: &InsideLoss) -> DMatrix<f64> {
         let width = self.width();
         let mut row = DMatrix::zeros(1, width);
@@ -164,7 +166,7 @@ impl Inside {
         self.through(&row)
     }
 
-    /// Of (p, q) and q̇ at a time.
+    /// The derivatives of (p, q) and q̇ at a time.
     pub(crate) fn at(&self, t: f64) -> Between {
         let (n, length) = (self.coordinates(), self.length);
         let tau = (t - self.times.0) / (self.times.1 - self.times.0);
@@ -179,7 +181,7 @@ impl Inside {
         let Some(moved) = &self.moved else {
             return between;
         };
-        // δτ = −δt/h at a fixed time.
+        // At a fixed time, δτ = −δt/h.
         let time = moved.time(tau) / -length;
         let stretch = moved.length() / length;
         let slopes = legendre_slopes(&values);

@@ -1,4 +1,4 @@
-//! Losses: numbers of a motion that are to be small, and their gradients.
+//! Losses: numbers computed from a motion that are to be minimised, and their gradients.
 
 use crate::differences::{derivative, derivative_of_either, resolved};
 use crate::error::{RunError, RunErrorKind};
@@ -26,7 +26,7 @@ use tfe_runtime::CoordinateName;
 /// ```
 #[derive(Clone)]
 pub struct Loss<'l, const N: usize, L: Length<N> = FixedLength> {
-    /// With their factors.
+    /// The terms with their factors.
     terms: Vec<(f64, Term<'l, N, L>)>,
 }
 
@@ -138,7 +138,8 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         self
     }
 
-    /// What it sees of a part of the motion, between two nodes: of the first one only in the first part, of the end only in the last.
+    /// The part of the loss that belongs to a part of the motion between two nodes. The first node is included only in
+    /// the first part, and the terms of the end only in the last.
     pub(crate) fn part(&self, (from, to): (f64, f64), (is_first, is_last): (bool, bool)) -> Self {
         let place = |t: f64| (t - from) / (to - from);
         let is_in = |t: f64| (place(t) > 0.0 || is_first) && place(t) <= 1.0;
@@ -156,13 +157,13 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         }
     }
 
-    /// Whether it looks at the motion between the nodes, too.
+    /// Whether the loss contains integrals, which depend on the motion between the nodes.
     pub(crate) fn has_integrals(&self) -> bool {
         let mut terms = self.terms.iter();
         terms.any(|(_, term)| matches!(term, Term::Integral(_)))
     }
 
-    /// Where it looks at the motion besides the end, for nodes beside what is `known` of those of the run.
+    /// The times at which the loss observes the motion, except the end; in addition to the `known` nodes of the run.
     pub(crate) fn nodes(&self, known: &[f64]) -> Vec<f64> {
         let times = self.terms.iter().flat_map(|(_, term)| {
             match term {
@@ -175,7 +176,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         looked_at(times, known)
     }
 
-    /// What is wrong with it for a model with these outputs and a span.
+    /// Checks the loss for a model with given outputs, and a span.
     pub(crate) fn check(
         &self,
         outputs: &[CoordinateName],
@@ -216,7 +217,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
         Ok(())
     }
 
-    /// Its value, and where and how it depends on the motion; an error where that is not finite.
+    /// The value of the loss and its derivatives by the motion; an error if they are not finite.
     pub(crate) fn seen<M: Evaluate<N, L>>(
         &self,
         motion: &Motion<N, L>,
@@ -234,7 +235,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
             match term {
                 Term::End(function) => {
                     value += factor * function(&nodes[last]);
-                    // The time of the end moves where an event decides it.
+                    // If an event determines the end, its time depends on the start and the parameters.
                     let span = (nodes[last].t - nodes[0].t).abs();
                     let span = (motion.is_stopped() && span > 0.0).then_some(span);
                     let by = partial(&nodes[last], (*factor, span), &**function);
@@ -284,7 +285,7 @@ impl<'l, const N: usize, L: Length<N>> Loss<'l, N, L> {
                 });
             }
         }
-        // In the order of nodes, in which they are asked for.
+        // Sorted in the order of the nodes, in which they are used.
         looks.sort_by_key(|look| look.node);
         Ok((value, Seen { looks, integrals }))
     }
@@ -296,16 +297,16 @@ impl<const N: usize, L: Length<N>> fmt::Debug for Loss<'_, N, L> {
     }
 }
 
-/// Where and how a loss depends on a motion.
+/// The derivatives of a loss by a motion.
 pub(crate) struct Seen {
-    /// At nodes, in their order.
+    /// The derivatives at nodes, in the order of the nodes.
     looks: Vec<Look>,
-    /// Integrals of outputs, with their factors.
+    /// The integrals of outputs, with their factors.
     pub(crate) integrals: Vec<(usize, f64)>,
 }
 
 impl Seen {
-    /// What it sees of a node.
+    /// The derivatives at a node.
     pub(crate) fn of_node(&self, node: usize) -> &[Look] {
         let first = self.looks.partition_point(|look| look.node < node);
         let own = &self.looks[first..];
@@ -313,17 +314,17 @@ impl Seen {
     }
 }
 
-/// A look of a loss at a node.
+/// A derivative of a loss at a node.
 pub(crate) struct Look {
     node: usize,
     pub(crate) by: By,
 }
 
-/// The derivative of what is seen.
+/// The form of such a derivative.
 pub(crate) enum By {
-    /// By an output, times a factor.
+    /// By an output, with a factor.
     Output(usize, f64),
-    /// By the time, coordinates, momenta and velocities.
+    /// By time, coordinates, momenta and velocities.
     Node {
         t: f64,
         q: Vec<f64>,
@@ -332,14 +333,15 @@ pub(crate) enum By {
     },
 }
 
-/// The derivative of a function of a node, by differences of sixth order; that by its time over a `span` of times, and zero if there is none.
+/// The derivatives of a function of a node, by sixth-order differences; for the time derivative, the step is relative
+/// to a `span` of time, and zero if there is none.
 fn partial<const N: usize, L: Length<N>>(
     node: &Node<N, L>,
     (factor, span): (f64, Option<f64>),
     function: &dyn Fn(&Node<N, L>) -> f64,
 ) -> By {
     const DISTANCE: f64 = 2e-3;
-    /// Of the span, in which a function of the time may go up and down many times.
+    /// The step in time relative to the span, in which the function may oscillate many times.
     const DISTANCE_IN_TIME: f64 = 2e-5;
 
     type Part<const N: usize, L> = fn(&mut Node<N, L>) -> &mut <L as Length<N>>::Vector;
@@ -383,7 +385,7 @@ pub struct LossGradient<const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> LossGradient<N, L> {
-    /// From the derivatives by the start, ordered (p, q); an error where one is not finite.
+    /// From the derivatives by the start, in the order (p, q); an error if one is not finite.
     pub(crate) fn new(
         motion: Motion<N, L>,
         names: Vec<String>,

@@ -1,9 +1,9 @@
 //! Parameters by their names.
 
-/// The place of a parameter among those that there are.
+/// The index of a parameter.
 ///
 /// # Panics
-/// Where none has this name.
+/// If no parameter has this name.
 #[track_caller]
 pub(crate) fn place_of(name: &str, parameters: &[String]) -> usize {
     let place = parameters.iter().position(|own| own == name);

@@ -1,4 +1,4 @@
-//! Velocities and outputs of models of run-time length, differentiated along changes of states and parameters.
+//! Derivatives of velocities and outputs by states and parameters, for models of run-time length.
 
 use crate::length::RunTimeLength;
 use crate::motion::Node;
@@ -7,7 +7,7 @@ use tfe_runtime::Form;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::family::{Block, Entries, Gradient, Model};
 
-/// The second derivative by velocities, bordered by the rows of constraints.
+/// The mass matrix ∂²L/∂v², bordered by the rows of the constraints.
 struct Mass {
     matrix: DMatrix<f64>,
     n: usize,
@@ -24,7 +24,7 @@ impl Entries<f64> for Mass {
     }
 }
 
-/// A v and Aᵀη, with derivatives.
+/// Evaluates A v and Aᵀη with derivatives.
 struct Held<'a> {
     v: &'a [f64],
     eta: &'a [f64],
@@ -39,13 +39,14 @@ impl Entries<Dual> for Held<'_> {
     }
 }
 
-/// What velocities and outputs of a model do where a node changes.
+/// The derivatives of the velocities and outputs of a model at a node.
 pub(crate) struct Along<'a, M> {
     model: &'a M,
     node: &'a Node<0, RunTimeLength>,
-    /// Factors of L_vv of a Lagrangian; where that is singular and there are constraints, of the matrix of (T-74).
+    /// The factors of L_vv of a Lagrangian; if that is singular and there are constraints, those of the matrix of
+    /// (T-74).
     factors: Option<LU<f64, Dyn, Dyn>>,
-    /// The multipliers η that this matrix has for p = L_v + Aᵀη; nothing of L_vv alone.
+    /// The multipliers η of this matrix, with p = L_v + Aᵀη; `None` for L_vv alone.
     eta: Option<Vec<f64>>,
 }
 
@@ -79,7 +80,7 @@ impl<'a, M: Model> Along<'a, M> {
         along
     }
 
-    /// Of L_vv with so many rows of constraints.
+    /// Factorises L_vv, bordered by a number of rows of constraints.
     fn factored(&self, rows: usize) -> LU<f64, Dyn, Dyn> {
         let (model, node) = (self.model, self.node);
         let n = model.len();
@@ -92,7 +93,8 @@ impl<'a, M: Model> Along<'a, M> {
         mass.matrix.lu()
     }
 
-    /// The changes of velocities, NaN where the mass matrix is singular, and of outputs; for one of (p, q) and of a parameter.
+    /// The derivatives of the velocities (NaN if the mass matrix is singular) and of the outputs, along a change of (p,
+    /// q) and of a parameter.
     pub(crate) fn slopes(&self, change: &[f64], parameter: Option<usize>) -> (Vec<f64>, Vec<f64>) {
         let n = self.model.len();
         let (by_p, by_q) = change.split_at(n);
@@ -126,7 +128,8 @@ impl<'a, M: Model> Along<'a, M> {
         (velocity, outputs)
     }
 
-    /// Takes the slopes of Aᵀη from what there is, and those of A v + a from nothing, at constant velocities and multipliers.
+    /// Subtracts the derivatives of Aᵀη from the entries of `right`, and appends those of −(A v + a), at constant
+    /// velocities and multipliers.
     fn add_held(&self, time: Dual, q: &[Dual], eta: &[f64], right: &mut Vec<f64>) {
         let mut drift = vec![Dual::ZERO; eta.len()];
         let mut held = Held {
@@ -143,7 +146,7 @@ impl<'a, M: Model> Along<'a, M> {
         right.extend(rates.map(|(rate, drift)| -(*rate + *drift).slope));
     }
 
-    /// The slopes of L_v, or H_p.
+    /// The derivatives of L_v, or of H_p.
     fn by_z(&self, time: Dual, q: &[Dual], z: &[Dual]) -> Vec<f64> {
         let first = self.first(time, q, z);
         first.iter().map(|one| one.slope).collect()
@@ -163,8 +166,8 @@ impl<'a, M: Model> Along<'a, M> {
     }
 }
 
-/// Whether constraints are not needed to tell velocities: pivots are small only beside their columns, which carry the units of their coordinates, and beside what was subtracted on the
-/// way to them, because rows carry these units, too.
+/// Whether the velocities are determined without constraints. Pivots are compared with their columns, whose units are
+/// those of coordinates, and with the terms subtracted in the elimination, since rows have these units, too.
 fn is_regular(factors: &LU<f64, Dyn, Dyn>) -> bool {
     const SINGULAR: f64 = 1e-10;
     let (l, u) = (factors.l(), factors.u());
@@ -190,7 +193,8 @@ mod tests {
     fn masses_are_regular_in_any_units() {
         let regular = |entries: [f64; 4]| is_regular(&DMatrix::from_row_slice(2, 2, &entries).lu());
         for length in [1.0, 1e-6, 1e-11, 1e-14, 1e-20, 1e11] {
-            // A body of one with a pendulum of a half, and the pendulum alone, whose bob and angle move alike.
+            // A body of mass one with a pendulum of mass one half; and the pendulum alone, whose bob and angle move in
+            // the same way.
             let (turned, square) = (0.5 * length, 0.5 * length * length);
             assert!(regular([1.5, turned, turned, square]), "{length}");
             assert!(regular([square, turned, turned, 1.5]), "{length}");

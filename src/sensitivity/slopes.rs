@@ -1,11 +1,11 @@
-//! Velocities and outputs differentiated along changes of states, times and parameters.
+//! Derivatives of velocities and outputs by states, times and parameters, for models of fixed size.
 
 use nalgebra::{DMatrix, DVector};
 use tfe_runtime::constrained::HeldVelocity;
 use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::{Direction, First, Form, Model, Parameter, State};
 
-/// A place of a motion, with its velocity.
+/// A point of a motion with its velocity.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<'a, const N: usize> {
     pub(crate) t: f64,
@@ -13,13 +13,13 @@ pub(crate) struct Place<'a, const N: usize> {
     pub(crate) v: &'a [f64; N],
 }
 
-/// A change of it.
+/// A change of such a point.
 #[derive(Clone, Copy)]
 pub(crate) struct Change<const N: usize> {
     pub(crate) t: f64,
     pub(crate) q: [f64; N],
     pub(crate) p: [f64; N],
-    /// The parameter that changes by one, by its index among all.
+    /// The index of the parameter that changes by one.
     pub(crate) parameter: Option<usize>,
 }
 
@@ -32,7 +32,7 @@ impl<const N: usize> Change<N> {
         parameter: None,
     };
 
-    /// A column of a matrix whose rows are ordered (p, q).
+    /// The change from a column of a matrix with rows in the order (p, q).
     pub(crate) fn of_column(matrix: &DMatrix<f64>, column: usize) -> Self {
         Self {
             t: 0.0,
@@ -43,13 +43,13 @@ impl<const N: usize> Change<N> {
     }
 }
 
-/// What velocities and outputs of a model do when a place changes.
+/// The derivatives of the velocities and outputs of a model at a point.
 pub(crate) struct Along<'a, M, const N: usize> {
     model: &'a M,
     place: Place<'a, N>,
-    /// L_vv⁻¹ of a Lagrangian.
+    /// The inverse of L_vv of a Lagrangian.
     inverse: Option<DMatrix<f64>>,
-    /// Where that is singular, and constraints leave one velocity.
+    /// Used if L_vv is singular, and the constraints determine the velocity.
     held: Option<HeldVelocity<N>>,
 }
 
@@ -60,13 +60,14 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
         let held = HeldVelocity::of(model, t, (&state.q, &state.p), v);
         let inverse = match (M::FORM, &held) {
             (Form::Hamiltonian, _) => None,
-            // Not even constraints leave one velocity.
+            // The constraints do not determine the velocity either.
             (Form::Lagrangian, Err(_)) => Some(unknown()),
             (Form::Lagrangian, Ok(_)) => {
                 let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
                 model.first_and_mass(t, &state.q, v, &mut first, &mut zz);
                 let mass = DMatrix::from_fn(N, N, |a, b| zz[a][b]);
-                // By factors: for two to four coordinates nalgebra divides by the determinant, which is a product of as many masses.
+                // By factorisation: for two to four coordinates, nalgebra would divide by the determinant, a product of
+                // as many masses, which may overflow or underflow.
                 Some(mass.lu().try_inverse().unwrap_or_else(unknown))
             }
         };
@@ -78,7 +79,7 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
         }
     }
 
-    /// δv; NaN where the mass matrix is singular, for motions that constraints allow if there are any.
+    /// δv; NaN if the mass matrix is singular. With constraints, for changes that these allow.
     pub(crate) fn velocity(&self, change: &Change<N>) -> [f64; N] {
         let Place { t, state, v } = self.place;
         let time = Dual::new(t, change.t).by_parameter(change.parameter);
@@ -99,7 +100,7 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
         std::array::from_fn(|a| found[a])
     }
 
-    /// The change of every output, where the velocity changes by `velocity`.
+    /// The changes of all outputs, given the change of the velocity.
     pub(crate) fn outputs(&self, change: &Change<N>, velocity: &[f64; N]) -> Vec<f64> {
         let Place { t, state, v } = self.place;
         let time = Dual::new(t, change.t).by_parameter(change.parameter);
@@ -114,7 +115,7 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
     }
 }
 
-/// Parameters, by their index among all, as directions: with kernels of their own where the model has them.
+/// Parameters, given by their indices, as directions; with special kernels if the model has them.
 pub(crate) fn directions<M: Model<N>, const N: usize>(
     model: &M,
     indices: &[usize],
@@ -130,7 +131,8 @@ pub(crate) fn directions<M: Model<N>, const N: usize>(
     indices.iter().map(parameter).collect()
 }
 
-/// What a parameter does to the momentum at fixed coordinates and velocities; NaN where the mass matrix is singular.
+/// The derivative of the momentum by a parameter, at fixed coordinates and velocities; NaN if the mass matrix is
+/// singular.
 pub(crate) fn momentum_by<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
@@ -145,7 +147,7 @@ pub(crate) fn momentum_by<M: Model<N>, const N: usize>(
             model.first(time, &still(q), &still(v), &mut first);
             first.z.map(|one| one.slope)
         }
-        // H_p = v stays: H_pp δp = −∂H_p/∂a.
+        // The velocity v = H_p is fixed: H_pp δp = −∂H_p/∂a.
         Form::Hamiltonian => {
             model.first(time, &still(q), &still(p), &mut first);
             let (mut plain, mut zz) = (First::ZERO, [[0.0; N]; N]);
