@@ -77,7 +77,7 @@ impl From<LegendreError> for ConsistentError {
     }
 }
 
-/// Each constraint that does not hold, with what it leaves.
+/// Writes each constraint that is violated, with its residuals.
 pub(crate) fn write_residuals(f: &mut fmt::Formatter<'_>, residuals: &[Residual]) -> fmt::Result {
     let mut separator = "";
     for residual in residuals {
@@ -193,7 +193,7 @@ pub trait ConsistentState<const N: usize>: Model<N> + Sized {
 
 impl<M: Model<N>, const N: usize> ConsistentState<N> for M {}
 
-/// The most iterations of a projection.
+/// The largest number of iterations of a projection.
 const MOST: u32 = 200;
 
 fn consistent<M: Model<N>, const N: usize>(
@@ -214,7 +214,7 @@ fn consistent<M: Model<N>, const N: usize>(
             return Err(StepError::NonFinite.into());
         }
         let is_stuck = size >= last && size <= 1e-12 * scale;
-        // What is nothing beside large coordinates may be much to small ones.
+        // A violation that is negligible relative to large coordinates may be large for small ones.
         if is_stuck || (size <= 2.0 * f64::EPSILON * scale && hold(model, t, &q)) {
             break;
         }
@@ -251,14 +251,15 @@ fn consistent<M: Model<N>, const N: usize>(
     })
 }
 
-/// Whether the holonomic constraints hold at a position, as far as a start must.
+/// Whether a position satisfies the holonomic constraints within the tolerance for a start.
 fn hold<M: Model<N>, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> bool {
     let residuals = constrained::start_residuals(model, t, q, &[0.0; N], 1.0);
     let mut positions = residuals.iter().map(|one| one.relative_position);
     positions.all(|position| position <= constrained::START_TOLERANCE)
 }
 
-/// One step of the projection: to the tangents of the constraints, and along them towards the given position. None without holonomic ones.
+/// One step of the projection: to the tangent planes of the constraints, and along these towards the given position.
+/// `None` without holonomic constraints.
 fn step_to_constraints<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
@@ -276,7 +277,7 @@ fn step_to_constraints<M: Model<N>, const N: usize>(
     if holonomic.is_empty() {
         return None;
     }
-    // Rows of length one, so that the rank does not depend on the units of constraints.
+    // Rows are normalised, so that the rank does not depend on the units of constraints.
     let length = |c: usize| {
         let length = rows[c].iter().map(|a| a * a).sum::<f64>().sqrt();
         if length > 0.0 { length } else { 1.0 }
@@ -347,9 +348,9 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
     Ok(held.basis())
 }
 
-/// The transition matrices of a chain on the motions that the constraints allow at its nodes.
+/// The transition matrices of a chain, restricted to the motions that the constraints allow at its nodes.
 ///
-/// The last one leads back to the tangent space of the start, which is that of the end of a periodic motion.
+/// The last one maps to the tangent space of the start, which is that of the end of a periodic motion.
 pub(crate) fn reduced<M: Model<N>, const N: usize>(
     model: &M,
     nodes: impl IntoIterator<Item = (f64, State<N>)>,

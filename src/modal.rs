@@ -63,19 +63,19 @@ pub use full::Reducible;
 /// ```
 pub struct Modal<'m, M, const R: usize, S = FamilyState> {
     full: &'m M,
-    /// ω²
+    /// The squared frequencies ω².
     squares: [f64; R],
-    /// f
+    /// The modal forces f.
     load: [f64; R],
-    /// φ_k, one after the other.
+    /// The mode shapes φ_k, concatenated.
     shapes: Vec<Vec<f64>>,
-    /// M φ_k
+    /// The momenta M φ_k.
     momenta: Vec<Vec<f64>>,
-    /// q_s
+    /// The static solution q_s.
     rest: Vec<f64>,
-    /// The momenta that belong to no velocity.
+    /// The constant part of the momenta.
     offset: Vec<f64>,
-    /// The energy at q_s without velocity.
+    /// The energy at q_s with zero velocity.
     energy_at_rest: f64,
     state: PhantomData<fn() -> S>,
 }
@@ -278,7 +278,7 @@ impl<M: Reducible<S>, S: PhasePoint, const R: usize> Model<R> for Modal<'_, M, R
 }
 
 impl<M, S, const R: usize> fmt::Debug for Modal<'_, M, R, S> {
-    /// Its frequencies; the model may have nothing to show.
+    /// The frequencies; the model need not be `Debug`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Modal")
             .field("coordinates", &self.rest.len())

@@ -1,4 +1,5 @@
-//! The motions that constraints allow, as columns: what is the same for models of either kind of length, and those of run-time length (T-78).
+//! Bases of the motions that constraints allow (T-78): the part for models of either kind of length, and that for
+//! models of run-time length.
 
 use crate::numbers::norm;
 use nalgebra::{DMatrix, DVector};
@@ -9,9 +10,9 @@ use {
     tfe_runtime::family::{self, Block, Entries, FamilyState, Gradient},
 };
 
-/// What keeps motions (δq, δv) at a state, and the matrix that makes (δp, δq) of them.
+/// The constraints on motions (δq, δv) at a state, and the matrix that maps these to (δp, δq).
 pub(super) struct Held {
-    /// Gradients in (q, v), independent of each other.
+    /// Independent gradients in (q, v).
     pub(super) gradients: Vec<DVector<f64>>,
     /// ```text
     /// [ L_vq  L_vv ]
@@ -21,10 +22,10 @@ pub(super) struct Held {
 }
 
 impl Held {
-    /// An orthonormal basis of what is left, ordered (p, q).
+    /// An orthonormal basis of the allowed motions, in the order (p, q).
     ///
-    /// Momenta of light bodies are small beside coordinates, those of heavy ones large. Reflections keep the digits of small rows where the larger rows and
-    /// the columns that have entries there come first.
+    /// Momenta of light bodies are small relative to coordinates, those of heavy bodies large. Householder reflections
+    /// keep the digits of small rows if the larger rows, and the columns with entries in them, come first.
     pub(super) fn basis(&self) -> DMatrix<f64> {
         let n = self.to_momenta.nrows() / 2;
         let [moved, at_rest] = self.motions().map(|motions| &self.to_momenta * motions);
@@ -36,7 +37,8 @@ impl Held {
         }
     }
 
-    /// Independent motions (δq, δv): those of coordinates, with the least velocities that they need, and those of velocities alone.
+    /// Independent motions (δq, δv): changes of the coordinates with the least changes of velocities that they require,
+    /// and changes of velocities alone.
     ///
     /// ```text
     /// A_V δq = 0 ,   δv = −A⁺ Ψ_q δq        and        A δv = 0
@@ -61,7 +63,7 @@ impl Held {
         let by_rows = |of: &[DVector<f64>]| DMatrix::from_fn(of.len(), n, |i, j| of[i][j]);
         let needed = by_rows(&rates) * &coordinates;
         let least = (by_rows(&rows) * &across).lu().solve(&needed);
-        // Rows that depend on one another leave nothing that is finite.
+        // With dependent rows the result would not be finite.
         let least = least.unwrap_or_else(|| needed.map(|_| f64::NAN));
         let velocities = across * -least;
         [
@@ -71,7 +73,7 @@ impl Held {
     }
 }
 
-/// Orthonormal bases of the span of independent unit vectors, and of what is perpendicular to it.
+/// Orthonormal bases of the span of independent unit vectors, and of its orthogonal complement.
 fn split(size: usize, vectors: &[DVector<f64>]) -> [DMatrix<f64>; 2] {
     let rank = vectors.len();
     let mut square = DMatrix::zeros(size, size);
@@ -85,7 +87,7 @@ fn split(size: usize, vectors: &[DVector<f64>]) -> [DMatrix<f64>; 2] {
     ]
 }
 
-/// One matrix above another.
+/// Stacks one matrix above another.
 fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
     let middle = above.nrows();
     DMatrix::from_fn(middle + below.nrows(), above.ncols(), |row, column| {
@@ -97,7 +99,7 @@ fn stacked(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// One matrix beside another.
+/// Puts one matrix beside another.
 fn side_by_side(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     let middle = left.ncols();
     DMatrix::from_fn(left.nrows(), middle + right.ncols(), |row, column| {
@@ -109,7 +111,7 @@ fn side_by_side(left: &DMatrix<f64>, right: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// The lower half of the rows above the upper one.
+/// Exchanges the upper and the lower half of the rows.
 fn halves_exchanged(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     let (rows, columns) = matrix.shape();
     DMatrix::from_fn(rows, columns, |row, column| {
@@ -117,7 +119,8 @@ fn halves_exchanged(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     })
 }
 
-/// The matrices of a chain in the bases at its nodes; the last one leads back to the basis of the start, which is that of the end of a periodic motion.
+/// The matrices of a chain in the bases at its nodes. The last one maps to the basis of the start, which is that of the
+/// end of a periodic motion.
 pub(crate) fn reduced<'a>(
     bases: &[DMatrix<f64>],
     matrices: impl Iterator<Item = &'a DMatrix<f64>>,
@@ -126,7 +129,7 @@ pub(crate) fn reduced<'a>(
     let reduced = elements.map(|(element, matrix)| {
         let (before, after) = (&bases[element], &bases[(element + 1) % bases.len()]);
         if before.ncols() != after.ncols() {
-            // The rank of the constraints changed on the way.
+            // The rank of the constraints changes along the motion.
             return Err(ConstraintError::RankChanged.into());
         }
         Ok(after.tr_mul(&(matrix * before)))
@@ -134,7 +137,7 @@ pub(crate) fn reduced<'a>(
     reduced.collect()
 }
 
-/// What takes the place of the matrices where a motion has no element: the identity on what is allowed at its start.
+/// The reduced matrix of a motion without elements: the identity on the motions allowed at its start.
 pub(crate) fn identity(
     start: Result<DMatrix<f64>, StepError>,
 ) -> Result<Vec<DMatrix<f64>>, StepError> {
@@ -168,7 +171,7 @@ pub(crate) fn basis_of<M: family::Model>(
     let [z, q, force] = &mut unused;
     let first = Gradient { z, q, force };
     model.second(t, &state.q, &v, first, &mut parts);
-    // φ is a function of coordinates and time: ∂(A v + a)/∂q is dA/dt along the motion.
+    // φ depends on coordinates and time only, so ∂(A v + a)/∂q is dA/dt along the motion.
     let pairs = state.q.iter().zip(&v);
     let moving: Vec<Dual> = pairs.map(|(q, v)| Dual::new(*q, *v)).collect();
     let mut drift = vec![Dual::ZERO; m];
@@ -190,7 +193,7 @@ pub(crate) fn basis_of<M: family::Model>(
     Ok(held.basis())
 }
 
-/// Takes L_vv, L_vq, A and dA/dt.
+/// Collects L_vv, L_vq, A and dA/dt.
 #[cfg(feature = "sparse")]
 struct Parts {
     n: usize,

@@ -1,19 +1,21 @@
-//! Modes with the digits that mass and stiffness have, however far apart they are.
+//! Refines modes so that all frequencies have the relative accuracy of mass and stiffness, however far apart they are.
 
 use nalgebra::DMatrix;
 
-/// Rounds of rotations: none as a rule, four where some springs are 10²⁰ times as stiff as others.
+/// The largest number of rounds of Jacobi rotations: usually none are needed, and four if some springs are 10²⁰ times
+/// as stiff as others.
 const ROUNDS: usize = 30;
 
-/// Rounds in succession after which a rigid mode is one. Until then it may be a slow one with a part of a stiff one that outweighs it; each round leaves some ε of that part, and
-/// twelve what no `f64` holds.
+/// The number of successive rounds after which a zero frequency is accepted as a rigid-body mode. Before that, it may
+/// be a slow mode with a dominating component of a stiff one. Each round reduces this component to a few ε of it;
+/// twelve rounds reach the smallest `f64`.
 const CERTAIN: u32 = 12;
 
-/// ω² and Φ with ΦᵀKΦ = diag(ω²), from a Φ with ΦᵀMΦ = 1 that makes it so to the roundings of the largest ω²: slow modes may be any combinations of each
-/// other, with a part of a stiff one.
+/// ω² and Φ with ΦᵀKΦ = diag(ω²), from a Φ with ΦᵀMΦ = 1 that diagonalises K up to the rounding errors of the largest
+/// ω²: slow modes may be any combinations of each other, with a component of a stiff mode.
 ///
-/// Jacobi's rotations [GVL, §8.5] keep ΦᵀMΦ, and the digits of small ω² beside large ones. What is a rounding is judged by its own terms,
-/// |Φ|ᵀ|K||Φ|: an ω² that is one is zero, that of a rigid motion.
+/// Jacobi rotations [GVL, §8.5] preserve ΦᵀMΦ, and the digits of a small ω² beside a large one. Rounding errors are
+/// estimated from the summands, |Φ|ᵀ|K||Φ|; an ω² within them is set to zero, that of a rigid-body mode.
 pub(super) fn diagonal(
     stiffness: &DMatrix<f64>,
     mut shapes: DMatrix<f64>,
@@ -47,10 +49,10 @@ pub(super) fn diagonal(
     (squares, shapes)
 }
 
-/// ΦᵀKΦ while columns of Φ are turned.
+/// The matrix ΦᵀKΦ during the rotations of the columns of Φ.
 struct Form {
     entries: DMatrix<f64>,
-    /// What each entry had of roundings before that.
+    /// The initial rounding errors of its entries.
     roundings: DMatrix<f64>,
 }
 
@@ -67,14 +69,14 @@ impl Form {
         }
     }
 
-    /// Whether the product of two modes says anything beside roundings, its own and those of their ω².
+    /// Whether the coupling of two modes exceeds the rounding errors of itself and of their ω².
     fn is_coupled(&self, i: usize, j: usize) -> bool {
         let size = |k: usize| self.entries[(k, k)].abs().sqrt();
         let coupling = self.entries[(i, j)].abs();
         coupling > self.roundings[(i, j)] && coupling > f64::EPSILON * size(i) * size(j)
     }
 
-    /// The rotation of two modes that makes their product zero.
+    /// Applies the rotation that makes the coupling of two modes zero.
     fn uncouple(&mut self, i: usize, j: usize, shapes: &mut DMatrix<f64>) {
         let a = &mut self.entries;
         let (one, coupling, other) = (a[(i, i)], a[(i, j)], a[(j, j)]);

@@ -8,33 +8,33 @@ use tfe_runtime::Form;
 /// A quadratic energy function, as a Lagrangian.
 #[derive(Clone, Debug)]
 pub struct Quadratic {
-    /// M
+    /// The mass matrix M.
     mass: DMatrix<f64>,
-    /// K
+    /// The stiffness matrix K.
     stiffness: DMatrix<f64>,
     /// f, the force at q = 0.
     pub(super) slope_q: DVector<f64>,
-    /// The momentum without velocity: that of terms linear in velocities, which move nothing.
+    /// The momentum at zero velocity, due to terms of L linear in velocities; it has no effect on the motion.
     pub(super) offset: Vec<f64>,
 }
 
-/// All modes, the lowest ω² first, and the equilibrium.
+/// All modes, by ascending ω², and the equilibrium.
 #[derive(Clone, Debug)]
 pub(super) struct Modes {
-    /// ω²
+    /// The squared frequencies ω².
     pub(super) squares: Vec<f64>,
-    /// φ
+    /// The mode shapes φ.
     pub(super) shapes: Vec<Vec<f64>>,
-    /// M φ
+    /// The momenta M φ.
     pub(super) momenta: Vec<Vec<f64>>,
-    /// What is left of f: φ·f of modes with ω = 0.
+    /// The remaining modal forces: φ·f of modes with ω = 0.
     pub(super) load: Vec<f64>,
-    /// q_s
+    /// The static solution q_s.
     pub(super) rest: Vec<f64>,
 }
 
 impl Quadratic {
-    /// From the second derivatives by zz, zq, qq and the first by z and q, all at zero.
+    /// From the second derivatives by zz, zq, qq and the first ones by z and q, all at zero.
     pub(super) fn new(
         form: Form,
         [zz, zq, qq]: [DMatrix<f64>; 3],
@@ -50,7 +50,7 @@ impl Quadratic {
             return Err(ModalError::NotFinite);
         }
         let gyroscopic = &zq - zq.transpose();
-        // Without those what is left is symmetric.
+        // Without these terms the rest is symmetric.
         for entries in [&gyroscopic, &zq] {
             if let Some(at) = entries.iter().position(|entry| *entry != 0.0) {
                 return Err(ModalError::VelocityCoupling {
@@ -80,7 +80,7 @@ impl Quadratic {
         })
     }
 
-    /// With M = L Lᵀ: the eigenvectors u of L⁻¹ K L⁻ᵀ give φ = L⁻ᵀ u, to roundings of the largest ω².
+    /// With M = L Lᵀ, the eigenvectors u of L⁻¹ K L⁻ᵀ give φ = L⁻ᵀ u, up to rounding errors of the largest ω².
     pub(super) fn modes(&self) -> Result<Modes, ModalError> {
         let n = self.slope_q.len();
         let lower = factors(self.mass.clone())?.unpack();
@@ -125,7 +125,7 @@ impl Modes {
     }
 }
 
-/// With its largest entry positive.
+/// The same mode with the sign for which its largest entry is positive.
 fn positive(shape: DVector<f64>) -> DVector<f64> {
     if shape[shape.iamax()] < 0.0 {
         -shape
@@ -134,7 +134,7 @@ fn positive(shape: DVector<f64>) -> DVector<f64> {
     }
 }
 
-/// Of a matrix that is positive by more than its roundings, in whatever units.
+/// The Cholesky factors of a matrix that is positive definite beyond rounding errors, whatever its units.
 fn factors(matrix: DMatrix<f64>) -> Result<Cholesky<f64, Dyn>, ModalError> {
     let roundings = matrix.diagonal() * (matrix.nrows() as f64 * f64::EPSILON);
     let factors = Cholesky::new(matrix).ok_or(ModalError::MassNotPositive)?;

@@ -1,4 +1,4 @@
-//! Why a model has no modes.
+//! The errors of modal reduction.
 
 use std::error::Error;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! What is asked of the full model, of fixed size or of run-time length.
+//! The interface to the full model, of fixed size or of run-time length.
 
 use super::eigen::Quadratic;
 use super::error::ModalError;
@@ -9,18 +9,18 @@ use tfe_runtime::{CoordinateName, Facts, First, Form, Model, Real, Second, State
 /// A model with states of type `S` that can be reduced to modes: every [`Model`] with [`State`] and every
 /// [`family::Model`] with [`FamilyState`]. Not to be implemented elsewhere.
 pub trait Reducible<S> {
-    /// By which function the model was declared.
+    /// Whether the model was declared by a Lagrangian or a Hamiltonian.
     const DECLARED: Form;
 
-    /// The energy function as a quadratic one.
+    /// The energy function as a quadratic form.
     #[doc(hidden)]
     fn quadratic(&self) -> Result<Quadratic, ModalError>;
 
-    /// The energy at coordinates with momenta that belong to no velocity.
+    /// The energy at given coordinates and zero velocity; `offset` is the momentum that belongs to it.
     #[doc(hidden)]
     fn energy_at(&self, q: &[f64], offset: &[f64]) -> f64;
 
-    /// A state.
+    /// Creates a state.
     #[doc(hidden)]
     fn state_of(q: Vec<f64>, p: Vec<f64>) -> S;
 
@@ -32,12 +32,12 @@ pub trait Reducible<S> {
     #[doc(hidden)]
     fn column_name_of(&self, column: usize) -> CoordinateName;
 
-    /// The outputs.
+    /// Writes the outputs.
     #[doc(hidden)]
     fn observables_of<T: Real>(&self, t: T, q: &[T], z: &[T], values: &mut [T]);
 }
 
-/// Refuses what has no modes of the kind that are found here.
+/// Refuses models that have no real modes of the supported kind.
 fn admitted(facts: Facts, is_constrained: bool) -> Result<(), ModalError> {
     if is_constrained {
         return Err(ModalError::Constrained);
@@ -100,7 +100,7 @@ impl<M: Model<N>, const N: usize> Reducible<State<N>> for M {
     }
 
     fn observables_of<T: Real>(&self, t: T, q: &[T], z: &[T], values: &mut [T]) {
-        // They are as long as the model: of its own vectors.
+        // They have the length of the model, since they come from its own vectors.
         if let (Ok(q), Ok(z)) = (q.try_into(), z.try_into()) {
             self.observables(t, q, z, values);
         }
@@ -159,7 +159,7 @@ impl<M: family::Model> Reducible<FamilyState> for M {
     }
 }
 
-/// ∂²/∂z∂z, ∂²/∂z∂q and ∂²/∂q∂q as matrices.
+/// ∂²/∂z∂z, ∂²/∂z∂q and ∂²/∂q∂q as dense matrices.
 struct Dense([DMatrix<f64>; 3]);
 
 impl Entries<f64> for Dense {
@@ -168,7 +168,7 @@ impl Entries<f64> for Dense {
             Block::ZZ => 0,
             Block::ZQ => 1,
             Block::QQ => 2,
-            // Forces and constraints were refused.
+            // Forces and constraints have been refused.
             _ => return,
         };
         self.0[at][(row, column)] += value;
