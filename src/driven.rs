@@ -204,13 +204,13 @@ impl<'m, M, L> Driven<'m, M, L> {
         Ok(self)
     }
 
-    /// The same model, which looks at `cells` first.
+    /// The same model; inputs that are set in `cells` take precedence.
     pub(crate) fn holding(mut self, cells: Arc<Cells>) -> Self {
         self.sources.held = Some(cells);
         self
     }
 
-    /// The same inputs of another model.
+    /// The same inputs for another model.
     fn of(&self, model: M) -> Self
     where
         M: Send + Sync,
@@ -222,7 +222,7 @@ impl<'m, M, L> Driven<'m, M, L> {
     }
 }
 
-/// The place of an input among those of a model.
+/// The index of an input among those of a model.
 pub(crate) fn place(known: &'static [&'static str], name: &str) -> Result<usize, InputError> {
     let mut inputs = known.iter().take(MAX_INPUTS);
     let place = inputs.position(|own| *own == name);

@@ -1,4 +1,4 @@
-//! What can be wrong with inputs.
+//! The errors of inputs.
 
 use std::error::Error;
 use std::fmt;

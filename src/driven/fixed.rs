@@ -1,4 +1,4 @@
-//! Models of fixed size whose inputs are given.
+//! Models of fixed size with given inputs.
 
 use super::Driven;
 use std::array;
@@ -7,7 +7,8 @@ use tfe_runtime::{
     InputPanicked, MAX_INPUTS, Model, Real, Second,
 };
 
-/// How long inputs are to move along their rates: until one has moved by that part of its size, or of one, at which the two errors of a difference, of second order and of rounding, are alike.
+/// The time step of difference quotients along the rates of the inputs. Within it, an input moves by that fraction of
+/// its size (at least one) for which the truncation error of second order equals the rounding error.
 fn distance<R: Real>(inputs: &[R; MAX_INPUTS], rates: &[R; MAX_INPUTS], t: R) -> R {
     const PART: f64 = 6e-6;
     let mut fastest = t.like(f64::MIN_POSITIVE);
@@ -19,7 +20,8 @@ fn distance<R: Real>(inputs: &[R; MAX_INPUTS], rates: &[R; MAX_INPUTS], t: R) ->
 }
 
 impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
-    /// Once for all that a step asks, so that functions are called as fast as they are. What is half done is left alone by those who are told.
+    /// Catches a panic of an input function. The guard surrounds a whole step, so that single calls cost nothing; after
+    /// a panic the caller discards what is incomplete.
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked> {
         self.sources.guarded(f)
     }
@@ -98,7 +100,9 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         self.model.sensitivity_parameter(index)
     }
 
-    /// Derivatives by the time are those at fixed inputs and, where an input is a function or a table, differences along the rates of the inputs, over some 1e-5 of their size: good to some 1e-10.
+    /// The time derivatives include those at fixed inputs. If an input is a function or a table, difference quotients
+    /// along the rates of the inputs are added, with steps of about 1e-5 of their size; their relative error is about
+    /// 1e-10.
     fn first_by<R: Real>(&self, by: By, t: R, q: &[R; N], z: &[R; N], first: &mut First<R, N>) {
         let inputs = self.sources.values(t);
         if by != By::Time || self.sources.is_constant() {
@@ -108,7 +112,7 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         self.model.first_by_with(by, &inputs, t, q, z, &mut fixed);
         let rates = self.sources.rates(t);
         let distance = distance(&inputs, &rates, t);
-        // What an input is at another time may be beyond a jump.
+        // An input at another time may lie beyond a jump, so it is extrapolated by its rate.
         let moved = |by: R| -> [R; MAX_INPUTS] { array::from_fn(|k| inputs[k] + by * rates[k]) };
         self.model
             .first_with(&moved(-distance), t, q, z, &mut before);

@@ -1,4 +1,4 @@
-//! Models of run-time length whose inputs are given.
+//! Models of run-time length with given inputs.
 
 use super::Driven;
 use crate::length::{Declared, RunTimeLength};
@@ -10,7 +10,8 @@ impl<M: Controlled> Declared<0> for Driven<'_, M, RunTimeLength> {
 }
 
 impl<M: Controlled> Model for Driven<'_, M, RunTimeLength> {
-    /// Once for all that a step asks, so that functions are called as fast as they are. What is half done is left alone by those who are told.
+    /// Catches a panic of an input function. The guard surrounds a whole step, so that single calls cost nothing; after
+    /// a panic the caller discards what is incomplete.
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked> {
         self.sources.guarded(f)
     }

@@ -1,4 +1,4 @@
-//! Where the inputs of a model come from.
+//! The sources of the inputs of a model: functions of time, tables, and numbers set between steps.
 
 use super::table::Table;
 use crate::differences::derivative_by_time;
@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, ThreadId};
 use tfe_runtime::{InputFailure, InputPanicked, MAX_INPUTS, Real};
 
-/// Where an input comes from.
+/// The source of an input.
 #[derive(Clone)]
 pub(super) enum Source<'m> {
     Zero,
@@ -16,17 +16,18 @@ pub(super) enum Source<'m> {
     Table(Arc<Table>),
 }
 
-/// Where all inputs of a model come from.
+/// The sources of all inputs of a model.
 #[derive(Clone)]
 pub(super) struct Sources<'m> {
     pub(super) each: Vec<Source<'m>>,
-    /// Numbers set between steps, which go before the others.
+    /// Numbers set between steps, which take precedence.
     pub(super) held: Option<Arc<Cells>>,
-    /// The last numbers of functions that were not finite. Runs of one model may go on at the same time, each on a thread of its own.
+    /// The last values of functions that were not finite. Several threads may run the same model at the same time, so
+    /// each entry belongs to a thread.
     failed: Arc<Mutex<Vec<Failed>>>,
 }
 
-/// A number that was not finite.
+/// A value that was not finite.
 #[derive(Clone, Copy)]
 struct Failed {
     on: ThreadId,
@@ -35,11 +36,11 @@ struct Failed {
     value: f64,
 }
 
-/// Inputs that are set between steps.
+/// Numbers of inputs that are set between steps.
 #[derive(Debug)]
 pub(crate) struct Cells([AtomicU64; MAX_INPUTS]);
 
-/// No number was set: the bits of a NaN, which is none either.
+/// The bits of a NaN, which mark an input that was not set.
 const UNSET: u64 = u64::MAX;
 
 impl Cells {
@@ -73,10 +74,11 @@ impl Source<'_> {
     }
 }
 
-/// The derivative of a function of the time, of an order: 0 is the function.
+/// The derivative of a function of time of a given order; order 0 is the function itself.
 #[cold]
 fn derivative_of(function: &dyn Fn(f64) -> f64, order: u32, t: f64) -> f64 {
-    /// No simple part of usual periods, and so short that functions are asked hardly beyond a span.
+    /// The first step. It is not a simple fraction of common periods, and so short that functions are hardly evaluated
+    /// outside of the span.
     const FIRST: f64 = 1.570_796e-4;
     match order {
         0 => function(t),
@@ -85,7 +87,7 @@ fn derivative_of(function: &dyn Fn(f64) -> f64, order: u32, t: f64) -> f64 {
 }
 
 impl Sources<'_> {
-    /// So many inputs, all of them zero.
+    /// A number of inputs that are all zero.
     pub(super) fn zero(count: usize) -> Self {
         Self {
             each: vec![Source::Zero; count.min(MAX_INPUTS)],
@@ -104,7 +106,7 @@ impl Sources<'_> {
                 (None, Source::Zero) => continue,
                 (None, Source::Function(function)) => {
                     t.map_with_derivatives(&mut |order, t| match order {
-                        // At a time that is none functions are not asked.
+                        // Functions are not evaluated at a time that is not finite.
                         _ if t.is_nan() => t,
                         0 => self.checked(input, t, function(t)),
                         _ => derivative_of(&**function, order, t),
@@ -118,7 +120,8 @@ impl Sources<'_> {
         values
     }
 
-    /// The derivatives of all inputs by the time: of a table that of its piece, of a function differences over distances that suit it.
+    /// The time derivatives of all inputs: of a table, that of its piece; of a function, by differences with a suitable
+    /// step.
     pub(super) fn rates<R: Real>(&self, t: R) -> [R; MAX_INPUTS] {
         let mut rates = [t.like(0.0); MAX_INPUTS];
         for ((input, source), rate) in self.each.iter().enumerate().zip(&mut rates) {
@@ -142,7 +145,7 @@ impl Sources<'_> {
         rates
     }
 
-    /// The value of a function, which is noted where it is not finite.
+    /// The value of a function; it is recorded if it is not finite.
     #[inline(always)]
     fn checked(&self, input: usize, time: f64, value: f64) -> f64 {
         if !value.is_finite() {
@@ -164,18 +167,18 @@ impl Sources<'_> {
         });
     }
 
-    /// Whether both are the same functions and tables, not only such as give the same numbers.
+    /// Whether both have the same functions and tables, by identity, not by their values.
     pub(super) fn are_those_of(&self, other: &Self) -> bool {
         let same = self.each.iter().zip(&other.each).all(|(a, b)| a.is(b));
         same && self.held.is_none() && other.held.is_none()
     }
 
-    /// Whether no input changes with the time.
+    /// Whether no input depends on time.
     pub(super) fn is_constant(&self) -> bool {
         (self.each.iter()).all(|source| matches!(source, Source::Zero))
     }
 
-    /// What `f` gives, unless a function panics in it.
+    /// The result of `f`, unless an input function panics in it.
     pub(super) fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked> {
         if self.is_constant() {
             return Ok(f());
@@ -183,7 +186,7 @@ impl Sources<'_> {
         catch_unwind(AssertUnwindSafe(f)).map_err(|_| InputPanicked)
     }
 
-    /// The last number on this thread that was not finite, of inputs of these names; it is forgotten then.
+    /// Takes the last value on this thread that was not finite; `names` are the names of the inputs.
     pub(super) fn failure(&self, names: &[&'static str]) -> Option<InputFailure> {
         let mut failed = self.failed.lock().unwrap_or_else(PoisonError::into_inner);
         let on = thread::current().id();
@@ -205,7 +208,8 @@ mod tests {
     use super::*;
     use tfe_runtime::dual::Dual;
 
-    /// A function, a table that is held, and one of lines, within a difference of a time of both.
+    /// A function, a table with held values and one with linear interpolation, at times within a difference step of
+    /// their kinks.
     #[test]
     fn slopes_of_tables_are_those_of_their_pieces() {
         let table = |way| {
@@ -228,7 +232,7 @@ mod tests {
             assert_eq!([1, 2, 3].map(|k| values[k].slope), [0.0, 3.0 * slope, 0.0]);
             assert_eq!([1, 2, 3].map(|k| rates[k]), [0.0, slope, 0.0]);
         }
-        // What has failed on another thread is told there.
+        // A failure on another thread is reported there.
         let broken = Source::Function(Arc::new(|t: f64| 1.0 / (t - 3.0)));
         sources.each[3] = broken;
         std::thread::scope(|scope| {
@@ -242,12 +246,12 @@ mod tests {
         });
         assert!(sources.failure(&["a", "b", "c", "d"]).is_none());
         sources.each[3] = Source::Zero;
-        // At a time that is none neither is a number.
+        // At a time that is not finite, the values are not finite either.
         assert_eq!(
             sources.values(f64::NAN).map(f64::is_nan)[..4],
             [true, true, true, false]
         );
-        // Numbers set between steps do not change with the time.
+        // Numbers set between steps do not depend on time.
         let cells = Arc::new(Cells::new());
         cells.set(2, 7.0);
         sources.held = Some(cells);

@@ -1,4 +1,4 @@
-//! Values at given times, and what lies between.
+//! Tables of inputs: values at given times and their interpolation.
 
 /// How an input is interpolated between the times of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,12 +12,12 @@ pub enum Interpolation {
     Spline,
 }
 
-/// A piecewise cubic.
+/// A piecewise cubic polynomial.
 #[derive(Debug)]
 pub(super) struct Table {
     times: Vec<f64>,
     values: Vec<f64>,
-    /// Of every piece: what multiplies s, s² and s³, s the time since it began.
+    /// The coefficients of s, s² and s³ for each piece, where s is the time since its start.
     pieces: Vec<[f64; 3]>,
 }
 
@@ -50,7 +50,7 @@ impl Table {
         })
     }
 
-    /// The value at a time; at one of the table's its own, which begins a piece.
+    /// The value at a time; at a time of the table, exactly the given value.
     pub(super) fn at(&self, t: f64) -> f64 {
         if t.is_nan() {
             return t;
@@ -65,7 +65,8 @@ impl Table {
         self.values[piece] + s * (a + s * (b + s * c))
     }
 
-    /// The derivative of an order, 0 the value: that of the piece in which a time lies, whatever there is beyond its ends. Where values are kept, it is zero.
+    /// The derivative of a given order, with 0 the value: that of the piece that contains the time, extrapolated beyond
+    /// its ends. Zero for held values.
     pub(super) fn derivative(&self, order: u32, t: f64) -> f64 {
         if order == 0 || t.is_nan() {
             return self.at(t);
@@ -85,7 +86,7 @@ impl Table {
     }
 }
 
-/// The slopes of the chords.
+/// The slopes of the chords between successive values.
 fn slopes<'a>(times: &'a [f64], values: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
     let pairs = times.windows(2).zip(values.windows(2));
     pairs.map(|(t, f)| (f[1] - f[0]) / (t[1] - t[0]))
@@ -105,7 +106,7 @@ fn spline(times: &[f64], values: &[f64]) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Second derivatives at the times.
+/// The second derivatives of the spline at the times.
 fn bends(steps: &[f64], chords: &[f64]) -> Vec<f64> {
     let n = steps.len();
     match n {
@@ -161,7 +162,7 @@ mod tests {
         Table::new(times, &values, interpolation).expect("a table")
     }
 
-    /// What has as many degrees as values is its own interpolation.
+    /// A polynomial of at most the degree of the interpolation is reproduced.
     #[test]
     fn polynomials_are_reproduced() {
         let cubic = |t: f64| 1.0 + t * (2.0 + t * (-3.0 + t * 0.5));
@@ -184,7 +185,7 @@ mod tests {
         assert!((lines.at(0.77) - line(0.77)).abs() < 1e-15);
     }
 
-    /// Of order four with its ends.
+    /// The interpolation has order four up to its ends.
     #[test]
     fn splines_have_order_four() {
         let error = |count: u32| {
@@ -198,7 +199,7 @@ mod tests {
                 .map(|t| (table.at(t) - (3.0 * t).sin()).abs())
                 .fold(0.0, crate::numbers::larger)
         };
-        // The ends, which are extrapolated, let it begin a little higher.
+        // Because of the extrapolated ends, the order measured with fewer points is a little higher.
         let order = (error(256) / error(512)).log2();
         assert!((order - 4.0).abs() < 0.1, "{order}");
     }
@@ -221,14 +222,14 @@ mod tests {
         assert_eq!(held.at(0.999), 0.2 * 0.2);
     }
 
-    /// At a time of the table and beyond by roundings, each side has derivatives of its own.
+    /// At a time of the table, and within rounding of it, each side has its own derivatives.
     #[test]
     fn derivatives_are_those_of_the_own_piece() {
         let held = table(Interpolation::Hold, |t| t * t, 6);
         let lines = table(Interpolation::Linear, |t| t * t, 6);
         let slopes: Vec<f64> = lines.pieces.iter().map(|piece| piece[0]).collect();
         for (k, t) in TIMES.iter().enumerate() {
-            // Kept before the first time and from the last one on.
+            // Constant before the first time and from the last one on.
             let before = k.checked_sub(1).map_or(0.0, |piece| slopes[piece]);
             let after = slopes.get(k).copied().unwrap_or(0.0);
             for (time, slope) in [(t.next_down(), before), (*t, after), (t.next_up(), after)] {
