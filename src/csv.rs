@@ -1,4 +1,4 @@
-//! Tables of numbers as CSV files.
+//! Writes tables of numbers as CSV files.
 
 use std::collections::HashSet;
 use std::fs::File;
@@ -7,13 +7,13 @@ use std::path::Path;
 
 /// The name of a column.
 pub(crate) enum Column {
-    /// Given by the model: it stays.
+    /// A name from the model, which is kept.
     Model(String),
-    /// Given by the table: underscores behind it tell it from others of the same name.
+    /// A name from the table; underscores are appended if a name of the model is the same.
     Table(String),
 }
 
-/// Writes a header and rows; numbers in the shortest form that reads back exactly.
+/// Writes a header and rows, with numbers in the shortest form that reads back exactly.
 pub(crate) fn write(
     path: &Path,
     header: &[Column],
@@ -31,7 +31,7 @@ pub(crate) fn write(
     file.flush()
 }
 
-/// Names of columns, by which each is found.
+/// Column names without duplicates.
 fn distinct(header: &[Column]) -> Vec<String> {
     let of_model = |column: &Column| match column {
         Column::Model(name) => Some(name.clone()),

@@ -222,7 +222,8 @@ pub enum RunErrorKind {
 }
 
 impl RunErrorKind {
-    /// Of an element that could not be solved: for a function of an input that was not finite within it, if there is one.
+    /// The error of an element that could not be solved; if the function of an input was not finite in it, the error
+    /// names that.
     pub(crate) fn of_element(
         failed_input: Option<InputFailure>,
         element: usize,
@@ -249,7 +250,7 @@ impl RunErrorKind {
         }
     }
 
-    /// Of a function of an input that has panicked in an element.
+    /// The error of an input function that panicked in an element.
     pub(crate) fn panicked(time: f64) -> Self {
         Self::Input(InputError::Panicked { time })
     }
@@ -270,7 +271,7 @@ impl<const N: usize, L: Length<N>> RunError<N, L> {
         }
     }
 
-    /// The same where a call was made `by` another one, which is the one to name.
+    /// The same error for a call that was made by another one; that one is named.
     pub(crate) fn of_call(mut self, made: &str, by: &'static str) -> Self {
         if let RunErrorKind::SetUnsupported { call }
         | RunErrorKind::KinksUnsupported { call }
@@ -521,7 +522,7 @@ impl<const N: usize, L: Length<N>> fmt::Display for RunError<N, L> {
             }
             _ => {}
         }
-        // The likely reasons of the failure.
+        // The likely causes of the failure.
         for warning in self.partial.warnings() {
             write!(f, "; {warning}")?;
         }

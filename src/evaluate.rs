@@ -1,4 +1,4 @@
-//! What a motion records of a model, of either kind of length.
+//! The evaluations of a model that motions record, for both kinds of length.
 
 use crate::constraints::ConstraintResidual;
 use crate::length::{FixedLength, Length, RunTimeLength};
@@ -17,16 +17,16 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
     /// The names of the constraints, in the order of declaration and of sites.
     fn constraint_names(&self) -> Vec<L::ConstraintName>;
 
-    /// dq/dt, looked for from `guess` on; `None` where no velocity belongs to the momentum.
+    /// dq/dt, by iteration from `guess`; `None` if no velocity belongs to the momentum.
     fn velocity(&self, t: f64, state: &L::State, guess: &L::Vector) -> Option<L::Vector>;
 
-    /// H = p·v − L, of coordinates and momenta with their velocities.
+    /// The energy H = p·v − L, from coordinates, momenta and velocities.
     fn energy(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
 
-    /// What that may be rounded by, where it is a difference of nearly equal numbers; zero where this is not known.
+    /// The rounding error of the energy, if it is a difference of nearly equal numbers; zero if unknown.
     fn energy_rounding(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
 
-    /// The outputs of a model that has any.
+    /// Writes the outputs, if the model has any.
     fn outputs(
         &self,
         t: f64,
@@ -35,28 +35,28 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
         values: &mut [f64],
     );
 
-    /// Whether there are constraints.
+    /// Whether the model has constraints.
     const IS_CONSTRAINED: bool;
 
-    /// What the state leaves of the constraints.
+    /// The violation of the constraints at a state.
     fn residual(&self, t: f64, q: &L::Vector, velocity: &L::Vector) -> ConstraintResidual;
 
-    /// The reactions of the constraints; NaN where they cannot be had.
+    /// The reactions of the constraints; NaN if they cannot be computed.
     fn reactions(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> Vec<f64>;
 
-    /// The same model with another value of a parameter, if one can be made.
+    /// The same model with another value of a parameter, if its parameters can be set.
     fn with(&self, parameter: &str, value: f64) -> Option<Self>;
 
-    /// Whether outputs need a velocity: of a Hamiltonian they are functions of momenta.
+    /// Whether outputs need the velocity; for a Hamiltonian they are functions of the momentum.
     const NEEDS_VELOCITY: bool;
 }
 
-/// So many names.
+/// A list of names.
 pub(crate) fn names(count: usize, name: &dyn Fn(usize) -> CoordinateName) -> Vec<CoordinateName> {
     (0..count).map(name).collect()
 }
 
-/// The largest residuals, beside how many constraints are independent.
+/// The largest residuals; `independent` tells which constraints are independent.
 fn largest(residuals: &[constrained::Residual], independent: &[bool]) -> ConstraintResidual {
     let (mut position, mut rate) = (0.0, 0.0);
     for one in residuals {

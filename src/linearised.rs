@@ -1,4 +1,4 @@
-//! Motions with the transition matrix of every element.
+//! Motions with the transition matrices of all elements.
 
 use crate::length::{FixedLength, Length};
 use crate::motion::Motion;
@@ -44,12 +44,13 @@ use tfe_runtime::StepError;
 pub struct Linearised<const N: usize, L: Length<N> = FixedLength> {
     motion: Motion<N, L>,
     transitions: Vec<DMatrix<f64>>,
-    /// The same on the motions that constraints allow, for models that have any; of an empty span the identity.
+    /// The matrices restricted to the motions that constraints allow, for models with constraints; the identity for an
+    /// empty span.
     reduced: Option<Result<Vec<DMatrix<f64>>, StepError>>,
 }
 
 impl<const N: usize, L: Length<N>> Linearised<N, L> {
-    /// With the matrices on the motions that constraints allow, if there are any.
+    /// Adds the matrices restricted to the motions that constraints allow, if there are constraints.
     pub(crate) fn with(
         motion: Motion<N, L>,
         transitions: Vec<DMatrix<f64>>,

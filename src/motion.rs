@@ -50,7 +50,7 @@ pub struct Node<const N: usize, L: Length<N> = FixedLength> {
 }
 
 impl<const N: usize, L: Length<N>> Node<N, L> {
-    /// A state with its velocities.
+    /// A node from a state and its velocity.
     #[inline(always)]
     pub(crate) fn of(t: f64, state: &L::State, v: L::Vector) -> Self {
         let (q, p) = L::parts(state);
@@ -58,7 +58,7 @@ impl<const N: usize, L: Length<N>> Node<N, L> {
         Self { t, q, p, v }
     }
 
-    /// A state of a model, whose velocities are looked for from `guess` on.
+    /// A node of a model; the velocity is found by iteration from `guess`.
     #[inline(always)]
     pub(crate) fn new<M>(model: &M, t: f64, state: &L::State, guess: &L::Vector) -> Self
     where
@@ -73,7 +73,7 @@ impl<const N: usize, L: Length<N>> Node<N, L> {
         L::state(self.q.clone(), self.p.clone())
     }
 
-    /// p·v
+    /// The product p·v.
     pub(crate) fn action(&self) -> f64 {
         action(self.v.as_ref(), self.p.as_ref())
     }
@@ -131,14 +131,14 @@ pub struct Motion<const N: usize, L: Length<N> = FixedLength> {
     warnings: Vec<Warning>,
     names: Vec<CoordinateName>,
     checkpoint: Option<Box<Checkpoint<N, L>>>,
-    /// Whether an event has ended it.
+    /// Whether an event has ended the motion.
     is_stopped: bool,
     events: Vec<Event<N, L>>,
     arcs: Arcs,
 }
 
 impl<const N: usize, L: Length<N>> Motion<N, L> {
-    /// The motion of a model that has only its start.
+    /// A motion that consists of its start.
     pub(crate) fn from_start<M>(model: &M, t: f64, start: &L::State) -> Self
     where
         M: Evaluate<N, L>,
@@ -148,14 +148,14 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         Self::starting(model, node)
     }
 
-    /// The same of a start whose velocity is known.
+    /// The same for a start whose velocity is known.
     pub(crate) fn starting<M: Evaluate<N, L>>(model: &M, node: Node<N, L>) -> Self {
         let mut motion = Self::empty(model);
         motion.record_node(model, node);
         motion
     }
 
-    /// The same of a start whose reactions are known as well.
+    /// The same for a start whose reactions are known as well.
     pub(crate) fn starting_with<M>(model: &M, node: Node<N, L>, reactions: Vec<f64>) -> Self
     where
         M: Evaluate<N, L>,
@@ -165,7 +165,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         motion
     }
 
-    /// The same of a model that cannot be evaluated there.
+    /// The same for a model that cannot be evaluated at the start.
     pub(crate) fn unknown<M: Evaluate<N, L>>(model: &M, t: f64, start: &L::State) -> Self {
         let mut motion = Self::empty(model);
         let (_, p) = L::parts(start);
@@ -178,7 +178,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         motion
     }
 
-    /// The start of a run that never began: nothing is asked of the model, whose lengths may not even fit together.
+    /// The start of a run that never began. The model is not evaluated, since its lengths may be inconsistent.
     pub(crate) fn unasked(t: f64, start: &L::State) -> Self {
         let (_, p) = L::parts(start);
         let nodes = vec![Node::of(t, start, L::unknown(p))];
@@ -229,8 +229,8 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         }
     }
 
-    /// Appends a node, with its velocity, energy and observables. Where the Legendre transform has no solution at the node they are
-    /// recorded as NaN: the state itself is good, and its momentum may well belong to no velocity (a singular mass matrix).
+    /// Appends a node with its velocity, energy and outputs. These are NaN if the Legendre transform has no solution
+    /// (singular mass matrix); the state itself is still valid.
     pub(crate) fn record<M: Evaluate<N, L>>(&mut self, model: &M, t: f64, state: &L::State) {
         let zero;
         let guess = match self.velocities.last() {
@@ -244,7 +244,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.record_node(model, Node::new(model, t, state, guess));
     }
 
-    /// The same where the velocity is known.
+    /// The same if the velocity is known.
     #[inline(always)]
     pub(crate) fn record_node<M: Evaluate<N, L>>(&mut self, model: &M, node: Node<N, L>) {
         let reactions = match M::IS_CONSTRAINED {
@@ -254,7 +254,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.record_all(model, node, reactions);
     }
 
-    /// The same where the reactions are known as well.
+    /// The same if the reactions are known as well.
     #[inline(always)]
     pub(crate) fn record_all<M>(&mut self, model: &M, node: Node<N, L>, reactions: Vec<f64>)
     where
@@ -291,7 +291,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.checkpoint = Some(Box::new(checkpoint));
     }
 
-    /// Says that an event has ended the run.
+    /// Records that an event has ended the run.
     pub(crate) fn set_stopped(&mut self) {
         self.is_stopped = true;
     }
@@ -324,7 +324,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.nodes.last().expect("a motion is made with its start")
     }
 
-    /// −1 of a motion backwards in time, else 1.
+    /// −1 for a motion backward in time, otherwise 1.
     pub(crate) fn direction(&self) -> f64 {
         match self.last().t < self.nodes[0].t {
             true => -1.0,
@@ -332,13 +332,13 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         }
     }
 
-    /// How many recorded nodes come before a time.
+    /// The number of recorded nodes before a time.
     pub(crate) fn nodes_before(&self, time: f64) -> usize {
         let direction = self.direction();
         (self.nodes).partition_point(|node| direction * node.t < direction * time)
     }
 
-    /// The place of the recorded node that is nearest to a time.
+    /// The index of the recorded node closest to a time.
     pub(crate) fn nearest(&self, time: f64) -> usize {
         let after = self.nodes_before(time);
         let before = after.saturating_sub(1);
@@ -364,7 +364,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         &self.velocities
     }
 
-    /// Energy and p·v at the last recorded node.
+    /// The energy and p·v at the last recorded node.
     pub(crate) fn last_energy(&self) -> (f64, f64) {
         let energy = self.energies.last().copied();
         (energy.unwrap_or(f64::NAN), self.last().action())
@@ -410,7 +410,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         }
     }
 
-    /// The elements between the recorded nodes.
+    /// The polynomials of the elements between the recorded nodes.
     pub(crate) fn elements(&self) -> &[L::Polynomial] {
         &self.elements
     }
@@ -562,12 +562,12 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.arcs.settings()
     }
 
-    /// Another arc begins at the last node.
+    /// Begins a new arc at the last node.
     pub(crate) fn begin_arc(&mut self, so_far: Statistics) {
         self.arcs.begin(self.nodes.len() - 1, so_far);
     }
 
-    /// Parameters, by their numbers, are set at the node that is to come, at the time of the last one.
+    /// Records that parameters, given by their indices, are set at the next node, which has the time of the last one.
     pub(crate) fn set_parameters(&mut self, names: &[CoordinateName], values: &[(usize, f64)]) {
         let (t, node) = (self.last().t, self.nodes.len());
         for (number, value) in values {
@@ -635,13 +635,14 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     }
 }
 
-/// p·v
+/// The product p·v.
 pub(crate) fn action(velocities: &[f64], momenta: &[f64]) -> f64 {
     let products = velocities.iter().zip(momenta);
     products.map(|(v, p)| v * p).sum()
 }
 
-/// With what changes of the energy are compared: its value at the start, or one where that is zero, or a rounding beside the largest product of momenta and velocities.
+/// The scale for changes of the energy: its value at the start, or one if that is zero or within the rounding error of
+/// the largest product of momenta and velocities.
 pub(crate) fn energy_scale(start: f64, largest_action: f64) -> f64 {
     const ROUNDING: f64 = 1e-12;
     if start == 0.0 || start.abs() <= ROUNDING * largest_action {
@@ -652,7 +653,7 @@ pub(crate) fn energy_scale(start: f64, largest_action: f64) -> f64 {
 }
 
 impl<const N: usize, L: Length<N>> fmt::Debug for Motion<N, L> {
-    /// The extent of the motion, not its thousands of numbers.
+    /// The extent of the motion, without its thousands of numbers.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Motion")
             .field("first", &self.nodes.first())

@@ -1,8 +1,8 @@
-//! Comparisons of numbers in which no NaN is lost, and numbers of any size in messages.
+//! Comparisons of numbers that do not lose a NaN, and numbers of any size in messages.
 
 use std::fmt;
 
-/// A number in a message: with an exponent where it would have rows of zeros.
+/// A number in a message, in scientific notation if it is very small or large.
 pub(crate) struct Short(pub(crate) f64);
 
 impl fmt::Display for Short {
@@ -17,7 +17,7 @@ impl fmt::Display for Short {
     }
 }
 
-/// A number in a table with so many decimals, or with an exponent where these would say little.
+/// A number in a table with a number of decimals, or in scientific notation if these would show little.
 pub(crate) fn digits(number: f64, decimals: usize) -> String {
     if number == 0.0 || (1e-2..1e9).contains(&number.abs()) {
         format!("{number:.decimals$}")
@@ -26,12 +26,12 @@ pub(crate) fn digits(number: f64, decimals: usize) -> String {
     }
 }
 
-/// The larger one; NaN if one is, which `f64::max` would drop: `errors.fold(0.0, larger)`.
+/// The larger of two numbers; NaN if one is NaN, which `f64::max` would ignore: `errors.fold(0.0, larger)`.
 pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
 }
 
-/// Keeps the larger one of what there is and a new value; NaN once one was.
+/// Raises a maximum to a new value; NaN is kept.
 pub(crate) fn raise(so_far: &mut f64, value: f64) {
     *so_far = larger(*so_far, value);
 }
@@ -41,7 +41,7 @@ pub(crate) fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().fold(0.0, |most, x| larger(most, x.abs()))
 }
 
-/// The root of the sum of squares, of numbers of any size.
+/// The Euclidean norm of numbers of any size.
 pub(crate) fn norm(numbers: &[f64]) -> f64 {
     let largest = largest(numbers);
     if largest == 0.0 {
@@ -51,7 +51,7 @@ pub(crate) fn norm(numbers: &[f64]) -> f64 {
     largest * sum.sqrt()
 }
 
-/// A row of a table with so many columns, which is stored row by row; `None` beyond the last.
+/// A row of a table that is stored row by row; `None` beyond the last.
 pub(crate) fn row_of(table: &[f64], columns: usize, row: usize) -> Option<&[f64]> {
     let start = row.checked_mul(columns)?;
     table.get(start..start.checked_add(columns)?)

@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// A line that says how much is done, rewritten once a second.
+/// A line with the completed fraction, rewritten once a second.
 pub(crate) struct Progress {
     shown: Option<Mutex<Shown>>,
     done: AtomicUsize,
@@ -13,7 +13,7 @@ pub(crate) struct Progress {
 }
 
 struct Shown {
-    /// What is counted, in the plural.
+    /// The name of what is counted, in the plural.
     what: &'static str,
     start: Instant,
     next: Instant,
@@ -21,7 +21,7 @@ struct Shown {
 }
 
 impl Progress {
-    /// Of so many runs, rows or steps.
+    /// Progress over a number of runs, rows or steps.
     pub(crate) fn new(is_wanted: bool, total: usize, what: &'static str) -> Self {
         let start = Instant::now();
         let shown = is_wanted.then(|| {
@@ -43,10 +43,10 @@ impl Progress {
         self.shown.is_some()
     }
 
-    /// Counts what is done.
+    /// Counts completed items.
     pub(crate) fn advance(&self, by: usize) {
         let done = self.done.fetch_add(by, Ordering::Relaxed) + by;
-        // Whoever is writing writes for all.
+        // If another thread is writing, it writes for all.
         if let Some(shown) = &self.shown
             && let Ok(mut shown) = shown.try_lock()
         {
@@ -66,7 +66,7 @@ impl Shown {
         let fraction = done as f64 / total as f64;
         let left = (now - self.start).as_secs_f64() * (1.0 / fraction - 1.0);
         let (what, percent) = (self.what, 100.0 * fraction);
-        // Progress that cannot be shown is no reason to stop.
+        // Errors of the display are ignored.
         let _ = write!(
             std::io::stderr(),
             "\r{done} of {total} {what} ({percent:.0} %), {left:.0} s left "

@@ -49,7 +49,7 @@ impl<M: family::Model> Velocity<0, RunTimeLength> for M {
         let n = self.len();
         let fits = self.check().is_ok() && (state.q.len(), state.p.len()) == (n, n);
         let found = fits.then(|| Evaluate::velocity(self, t, state, &state.p));
-        // Of a length that does not fit there may be no memory for a vector.
+        // If the length is wrong, there may not be enough memory for a vector.
         let unknown = || vec![f64::NAN; state.q.len()];
         found.flatten().unwrap_or_else(unknown)
     }

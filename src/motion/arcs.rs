@@ -30,10 +30,10 @@ pub struct Setting {
     pub value: f64,
 }
 
-/// Where arcs begin, and what was set there.
+/// The starts of the arcs, and the parameters that were set there.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Arcs {
-    /// The first nodes of all but the first arc, with what all before have cost.
+    /// The first node of each arc except the first, with the work up to there.
     begins: Vec<(usize, Statistics)>,
     settings: Vec<Setting>,
 }
@@ -51,7 +51,7 @@ impl Arcs {
         &self.settings
     }
 
-    /// The nodes of every arc of a motion of `count` nodes.
+    /// The ranges of nodes of all arcs of a motion with `count` nodes.
     pub(super) fn nodes(&self, count: usize) -> impl Iterator<Item = Range<usize>> {
         let begins = self.begins.iter().map(|(node, _)| *node);
         let starts = [0].into_iter().chain(begins.clone());
@@ -72,7 +72,7 @@ impl Arcs {
             })
     }
 
-    /// The model with what was set at a node; none where nothing was.
+    /// The model with the parameters that were set at a node; `None` if none were set.
     pub(super) fn model_from<M, L, const N: usize>(&self, model: &M, node: usize) -> Option<M>
     where
         M: Evaluate<N, L>,

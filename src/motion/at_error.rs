@@ -1,4 +1,4 @@
-//! Why a motion has no value at a time.
+//! The errors of evaluating a motion at a time.
 
 use std::error::Error;
 use std::fmt;

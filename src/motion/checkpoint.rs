@@ -1,4 +1,4 @@
-//! Where runs end, and how they go on.
+//! Checkpoints: the ends of runs, from which these can be continued.
 
 use crate::length::{FixedLength, Length};
 
@@ -29,35 +29,35 @@ impl<const N: usize, L: Length<N>> Checkpoint<N, L> {
     }
 }
 
-/// How far a run has got on its grid.
+/// The progress of a run on its mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct Reached {
-    /// Where it began.
+    /// The time at which the run began.
     pub(crate) origin: f64,
     pub(crate) step: Option<f64>,
-    /// How many elements were done.
+    /// The number of elements that are done.
     pub(crate) elements: usize,
     pub(crate) time: f64,
-    /// That of its last element, which has had the impulses at that time; zero where there was none.
+    /// The direction of the last element, in which impulses at its end have acted; zero if there was none.
     pub(crate) direction: f64,
 }
 
-/// What is known of events where a run has got to.
+/// The record of events at the end of a run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Seen {
-    /// What is looked for.
+    /// The names of the events that are watched.
     pub(crate) names: Vec<String>,
-    /// Sides on which the values were seen last; 0 where this is not known.
+    /// The last signs of the watched functions; 0 if unknown.
     pub(crate) sides: Vec<f64>,
     pub(crate) last: Option<LastCut>,
-    /// The last cut that each of them has made.
+    /// The last cut by each event.
     pub(crate) lasts: Vec<Option<LastCut>>,
-    /// Whether one has ended the run.
+    /// Whether an event has ended the run.
     pub(crate) has_stopped: bool,
 }
 
 impl Seen {
-    /// Nothing yet.
+    /// The record before a run.
     pub(crate) fn nothing(names: Vec<String>) -> Self {
         Self {
             sides: vec![0.0; names.len()],
@@ -68,7 +68,7 @@ impl Seen {
         }
     }
 
-    /// Goes on with a run that has looked for the same.
+    /// Takes over the record of an earlier run that watched the same events.
     pub(crate) fn go_on(&mut self, seen: &Self) {
         if !self.names.is_empty() && self.names == seen.names {
             self.clone_from(seen);
@@ -76,15 +76,15 @@ impl Seen {
     }
 }
 
-/// An event that cut an element.
+/// A cut of an element by an event.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LastCut {
     pub(crate) time: f64,
-    /// Among those that are looked for.
+    /// The index of the event among those watched.
     pub(crate) function: usize,
     pub(crate) rises: bool,
-    /// Whether the motion went on as if nothing had happened.
+    /// Whether the motion continued unchanged.
     pub(crate) is_idle: bool,
-    /// How fast the surface was met of an impact that has not been seen to throw the motion back; else zero.
+    /// The speed of an impact after which the motion has not yet been seen to rebound; otherwise zero.
     pub(crate) impact: f64,
 }

@@ -1,26 +1,26 @@
-//! The points at which functions of a motion are integrated.
+//! The quadrature points for integrals of functions along a motion.
 
 use super::at_error::AtError;
 use crate::evaluate::Evaluate;
 use crate::length::{Length, Polynomial};
 use tfe_runtime::quadrature::Quadrature;
 
-/// A point of an element, or of a piece of one that was cut.
+/// A quadrature point of an element, or of a piece of one that was cut.
 pub(crate) struct Point<const N: usize, L: Length<N>> {
-    /// The part of the element before it.
+    /// The position in the element, between 0 and 1.
     pub(crate) tau: f64,
     pub(crate) t: f64,
-    /// Its weight times the length of the element.
+    /// The quadrature weight times the length of the element.
     pub(crate) weight: f64,
     pub(crate) state: L::State,
-    /// That of the momentum, where outputs are functions of velocities.
+    /// The velocity that belongs to the momentum, if outputs are functions of velocities.
     pub(crate) velocity: L::Vector,
 }
 
-/// The s Gauss points of every element, s the degree of its polynomial.
+/// The s Gauss points of every element, where s is the degree of its polynomial.
 pub(crate) struct Points<const N: usize, L: Length<N>> {
     rule: Quadrature,
-    /// Velocities are looked for from the last one on.
+    /// The last velocity, the first guess for the next.
     velocity: L::Vector,
 }
 
@@ -32,7 +32,7 @@ impl<const N: usize, L: Length<N>> Points<N, L> {
         }
     }
 
-    /// Those of a piece, in order, as `each` is shown them.
+    /// Calls `each` with the points of a piece, in order.
     pub(crate) fn of<M: Evaluate<N, L>, E: From<AtError>>(
         &mut self,
         model: &M,

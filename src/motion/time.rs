@@ -1,23 +1,26 @@
-//! Which times are one, and which come first.
+//! Comparison, ordering and resolution of times.
 
 use std::ops::Range;
 
-/// Whether two times are one but for rounding: an element between them would be rounding. No time is the same as an infinite one.
+/// Whether two times are equal up to rounding, so that an element between them would be meaningless. Infinite times are
+/// equal to none.
 pub(crate) fn is_same_time(a: f64, b: f64) -> bool {
     let size = a.abs().max(b.abs());
     size < f64::INFINITY && (a - b).abs() <= 8.0 * f64::EPSILON * size
 }
 
-/// A step of fewer roundings of the time has points that share times.
+/// The shortest step in ulps of the time; in a shorter one, points of the element would have equal times.
 pub(crate) const LEAST_ROUNDINGS: f64 = 64.0;
 
-/// Whether no step leads from one time to the other: they are one but for rounding, or so near that it would not be resolved.
+/// Whether no step leads from one time to the other: they are equal up to rounding, or too close for a step to be
+/// resolved.
 pub(crate) fn is_unresolved(a: f64, b: f64) -> bool {
     let size = a.abs().max(b.abs());
     size < f64::INFINITY && (a - b).abs() <= LEAST_ROUNDINGS * f64::EPSILON * size
 }
 
-/// Of times at which a run is looked at those that can be nodes beside what is `known` of its nodes, in their order. The others are as near to one of these as roundings of sums of times are.
+/// Those of the given times that can be nodes in addition to the `known` ones, in their order. The others are within
+/// rounding of one of these.
 pub(crate) fn looked_at(times: impl IntoIterator<Item = f64>, known: &[f64]) -> Vec<f64> {
     let mut known = known.to_vec();
     known.sort_by(f64::total_cmp);
@@ -33,16 +36,17 @@ pub(crate) fn looked_at(times: impl IntoIterator<Item = f64>, known: &[f64]) -> 
     times
 }
 
-/// A count of steps beyond this is a mistake in units rather than a run: it would take years.
+/// The largest number of steps. A larger one is a mistake in units: such a run would take years.
 pub(crate) const MOST_STEPS: f64 = 1e15;
 
-/// The step of a run that is given none.
+/// The default step size of a run.
 pub(crate) fn default_step(span: &Range<f64>) -> f64 {
     (span.end - span.start).abs() / 1000.0
 }
 
-/// How many steps there are in a span, whose sign the step has, and whether the last one is as long as the others: but for a rounding of the quotient, as 10 / 0.01 may be
-/// 1000.0000000000001, or of the times, which far from zero is more. Such a rounding is no step of its own: it may be no time at all.
+/// The number of steps in a span, whose sign the step has, and whether the last one is as long as the others. Rounding
+/// errors do not add a step: those of the quotient, as 10 / 0.01 may be 1000.0000000000001, and those of the times,
+/// which are larger far from zero.
 pub(crate) fn count_steps(span: &Range<f64>, step: f64) -> (f64, bool) {
     let ratio = (span.end - span.start) / step;
     let nearest = ratio.round();
@@ -52,23 +56,23 @@ pub(crate) fn count_steps(span: &Range<f64>, step: f64) -> (f64, bool) {
     (steps.max(1.0), is_whole)
 }
 
-/// Whether so many steps lead from the start of a span to its end but for rounding.
+/// Whether a number of steps leads from the start of a span to its end, up to rounding.
 pub(crate) fn leads_to_end(span: &Range<f64>, step: f64, steps: f64) -> bool {
     let rounding = 4.0 * f64::EPSILON * span.start.abs().max(span.end.abs());
     ((span.end - span.start) - steps * step).abs() <= rounding
 }
 
-/// One, or minus one where a run goes back in time.
+/// 1, or −1 in backward integration.
 pub(crate) fn direction_of(span: &Range<f64>) -> f64 {
     if span.end < span.start { -1.0 } else { 1.0 }
 }
 
-/// Puts times in the order in which a run meets them. Not generic, so that it is compiled once.
+/// Sorts times in the order in which a run passes them. Not generic, so that it is compiled only once.
 pub(crate) fn sort_times(times: &mut [f64], direction: f64) {
     times.sort_by(|a, b| (direction * a).total_cmp(&(direction * b)));
 }
 
-/// Breaks inside a span, in the order of the run; none is the same as another one or as an end.
+/// The breaks inside a span, in the order of the run, without duplicates and without the ends.
 pub(crate) fn breaks_within(span: &Range<f64>, breaks: &[f64]) -> Vec<f64> {
     let Range { start, end } = *span;
     let direction = direction_of(span);

@@ -1,4 +1,4 @@
-//! What a run notices about itself.
+//! Warnings of a run about itself.
 
 use crate::numbers::Short;
 use std::fmt;
@@ -162,7 +162,8 @@ impl fmt::Display for Warning {
     }
 }
 
-/// A factor of an amplitude, with the digits that tell it from one, or with an exponent where others would be rows of zeros or of digits.
+/// The factor of an amplitude, with enough digits to distinguish it from one, or in scientific notation if it is very
+/// small or large.
 fn factor(value: f64) -> String {
     let from_one = (value - 1.0).abs();
     if (1e-12..1e-4).contains(&from_one) {
@@ -174,7 +175,7 @@ fn factor(value: f64) -> String {
     }
 }
 
-/// A part of something, however many times larger it is.
+/// A ratio, of any size.
 fn part(value: f64) -> String {
     if value < 1e3 {
         format!("{value:.2}")
