@@ -31,7 +31,7 @@ use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::Impulse;
 use value::Value;
 
-/// An event that is looked for.
+/// An event that a run watches.
 pub struct Watched<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(super) on: On<'m, N, L>,
     pub(super) value: Value<'m, L::Vector>,
@@ -171,7 +171,7 @@ pub(super) struct Cut<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     place: Place,
 }
 
-/// The same beside the element that was to be.
+/// An event in an element, with the element as planned; followers compute derivatives from it.
 pub struct Severed<'a, 'm, const N: usize, L: Length<N> = FixedLength> {
     /// The start of the element.
     pub(super) start: f64,

@@ -19,7 +19,7 @@ pub struct Passed<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) after: &'a L::State,
 }
 
-/// Is shown what a run does.
+/// An observer of a run.
 pub trait Follow<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// Called after an element that was passed to its end.
     fn passed(

@@ -6,7 +6,7 @@ use crate::motion::{default_step, direction_of};
 use std::ops::Range;
 use tfe_runtime::step::Impulse;
 
-/// What was asked of the elements of a run.
+/// The options that determine the mesh of a run.
 pub struct Grid<'a, I> {
     pub(crate) step: Option<f64>,
     pub(crate) nodes: Option<&'a [f64]>,
@@ -29,7 +29,7 @@ impl<I> Grid<'_, I> {
     }
 }
 
-/// All elements of a span.
+/// The elements of a span.
 #[derive(Clone, Debug)]
 pub struct Mesh<const N: usize> {
     times: Times,

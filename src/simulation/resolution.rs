@@ -7,7 +7,8 @@ use crate::motion::Warning;
 use std::fmt;
 use tfe_runtime::{Share, Solve, Statistics};
 
-/// Compares elements with three of a third of the length, those that were cut with nine of a ninth: halves might be cut into the same pieces as the element.
+/// Compares elements with three of a third of their length. Elements that were cut are compared with nine of a ninth:
+/// halves might be cut into the same pieces as the element.
 pub struct Resolution<'m, M: 'm, const N: usize, L: Length<N>> {
     again: Again<'m, M>,
     /// The largest contraction ratio of an element that needs no comparison.
@@ -56,13 +57,13 @@ impl Sample {
     }
 }
 
-/// With what elements are stepped over again: as in the run.
+/// The model and the solver for the shorter elements; those of the run.
 pub struct Again<'m, M: 'm> {
     pub(super) model: Share<'m, M>,
     pub(super) chosen: Chosen,
 }
 
-/// An element that has been passed without an error.
+/// An element that the run has solved.
 pub struct Examined<'a, const N: usize, L: Length<N>> {
     pub(super) t: f64,
     pub(super) h: f64,

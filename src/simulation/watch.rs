@@ -7,7 +7,7 @@ use crate::motion::{Motion, Node, Warning};
 use crate::stability::linear_model::LinearModel;
 use tfe_runtime::{Element, Model, State};
 
-/// Looks at the elements of a run now and then.
+/// Collects the warnings of a run: examines some of its elements, and the energy of its recorded nodes.
 #[derive(Clone, Debug)]
 pub struct Watch {
     /// `None` for an A-stable element, which needs no checks.

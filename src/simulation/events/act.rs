@@ -1,4 +1,4 @@
-//! What is done at events, and what a caller is told of them.
+//! The actions at events, and the data of an event that the caller receives.
 
 use super::remodel::{Changed, Remodel};
 use super::settings::Settings;

@@ -139,7 +139,7 @@ fn unseen<const N: usize, L: Length<N>>(watched: &[Watched<'_, N, L>]) -> Seen {
     Seen::nothing(watched.iter().map(|one| one.on.name.clone()).collect())
 }
 
-/// A model whose events may set parameters: it may go to other threads.
+/// A model whose events may set parameters; it can be shared between threads.
 pub trait Settable<'m, const N: usize, L: Length<N>>: Simulated<N, L> + Send + Sync + 'm {}
 
 impl<'m, M, const N: usize, L: Length<N>> Settable<'m, N, L> for M where
