@@ -243,7 +243,7 @@ fn climb(
                 Verdict::Shorter(wanted) => {
                     way.step = wanted;
                     if way.keeps {
-                        // For the same reason.
+                        // Amplified iteration errors become visible in the comparison, as above.
                         way.tolerance = (0.2 * way.tolerance).max(TIGHTEST);
                     }
                 }

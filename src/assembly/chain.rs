@@ -18,20 +18,20 @@
 //! ```
 //!
 //! Householder reflections of the 2m rows leave R triangular: the upper half is kept for the back substitution, the
-//! lower is the relation between y_0 and y_{e+1}. The dense rows go along, y_e eliminated from each by R. At the end a
-//! small system in (y_0, y_E, γ) remains (`closing`).
+//! lower is the relation between y_0 and y_{e+1}. R also eliminates y_e from the dense rows. At the end a small system
+//! in (y_0, y_E, γ) remains (`closing`).
 //!
-//! Where the recursion y_E = A_{E−1} ··· A_0 y_0 would keep the growing solutions only, the reflections weigh the two block
-//! rows by size: a solution that grows is carried by its value at the end, one that decays by that at the start. Such a
-//! chain is solved to the accuracy that its conditions at the ends allow. The converse holds as well: where these are
-//! initial values and solutions grow a billion times, the recursion is the better method, and this one loses nine digits.
+//! The recursion y_E = A_{E−1} ··· A_0 y_0 would keep the growing solutions only. The reflections weigh the two block
+//! rows by size: a growing solution is represented by its value at the end, a decaying one by its value at the start. A
+//! boundary-value problem is thus solved to the accuracy that its conditions allow. Conversely, for initial values and
+//! solutions that grow by a factor of a billion, the recursion is the better method, and this one loses nine digits.
 //!
 //! The cost is E (m³ 23/3 + O(m² (g + k + 1))) multiplications, the storage E m (4m + 2g + 2).
 //!
 //! # Scaling
-//! Coordinates and momenta have units of their own, which may make entries of A_e as large as they like; reflections
-//! mix rows and would lose what is small in them. So the nodes are first scaled by one diagonal matrix of powers of two,
-//! ŷ_e = D⁻¹ y_e, which balances the links and costs no round-off.
+//! Coordinates and momenta have different units, which may make entries of A_e arbitrarily large; reflections mix rows
+//! and would lose the digits of small entries. The nodes are therefore scaled by one diagonal matrix of powers of two,
+//! ŷ_e = D⁻¹ y_e, which balances the links and causes no rounding errors.
 //!
 //! # Reference
 //! S. J. Wright, *Stable parallel algorithms for two-point boundary value problems*, SIAM J. Sci. Stat. Comput. 13 (1992)
@@ -198,7 +198,7 @@ impl Chain {
     /// an error it has no meaning.
     ///
     /// # Errors
-    /// [`Singular`] if the equations do not determine the unknowns, to round-off, or hold what is not finite.
+    /// [`Singular`] if the equations do not determine the unknowns up to rounding errors, or a number is not finite.
     pub(crate) fn solve(&mut self) -> Result<(), Singular> {
         let shape = self.shape;
         let m = shape.block;

@@ -390,7 +390,7 @@ fn stacked(node: &DVector<f64>, inputs: &[f64]) -> DVector<f64> {
     DVector::from_vec([node.as_slice(), inputs].concat())
 }
 
-/// The symmetric part.
+/// The symmetric part of a matrix.
 fn symmetric(matrix: &DMatrix<f64>) -> DMatrix<f64> {
     (matrix + matrix.transpose()) * 0.5
 }

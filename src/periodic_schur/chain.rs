@@ -16,7 +16,7 @@ type Matrices = Vec<DMatrix<f64>>;
 pub(super) enum Wanted {
     /// Eigenvalues only: factors are balanced, there are no bases, and each block is transformed separately.
     Multipliers,
-    /// The bases and the whole triangular factors.
+    /// The bases and the complete triangular factors.
     SchurForm,
 }
 

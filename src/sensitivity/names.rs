@@ -1,4 +1,4 @@
-//! Parameters by their names.
+//! Finds parameters by their names.
 
 /// The index of a parameter.
 ///

@@ -329,7 +329,7 @@ mod tests {
             products: 500,
             ..Iteration::default()
         };
-        // Angles everywhere on the circle, one modulus.
+        // Angles all around one circle: all eigenvalues have the same modulus.
         let apply = |x: &[f64], y: &mut [f64]| {
             for i in 0..2000 {
                 y[i] = x[(i + 1) % 2000];

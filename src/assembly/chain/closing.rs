@@ -4,10 +4,10 @@ use super::equations::{Equations, Shape, Singular};
 use super::sweep::Sweep;
 use crate::periodic_schur::{exponent, power_of_two};
 
-/// A pivot below this part of the largest is taken for zero.
+/// A pivot below this fraction of the largest counts as zero.
 ///
-/// Rows and columns are scaled to entries of order one, so that the pivot of a singular system is what round-off leaves
-/// of zero: a few ε, from the reflections and from the elimination here. 1e-14 are 45 ε.
+/// Rows and columns are scaled to entries of order one. The smallest pivot of a singular system is then rounding error:
+/// a few ε, from the reflections and from the elimination here. 1e-14 are 45 ε.
 const THRESHOLD: f64 = 1e-14;
 
 /// A square system with its right sides, solved by elimination with full pivoting.

@@ -83,7 +83,7 @@ pub(crate) struct RightSide {
 /// Why the equations of a chain were not solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Singular {
-    /// The conditions do not determine the unknowns, to round-off.
+    /// The conditions do not determine the unknowns up to rounding errors.
     Rank {
         /// The number of independent equations found among those that remain for the two ends and the global unknowns.
         rank: usize,
@@ -92,7 +92,7 @@ pub(crate) enum Singular {
         /// The size of the first pivot that is taken for zero, relative to the largest.
         pivot: f64,
     },
-    /// A coefficient, or a number of the solution, is infinite or not a number.
+    /// A coefficient or a component of the solution is infinite or NaN.
     NotFinite,
 }
 

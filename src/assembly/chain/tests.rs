@@ -382,7 +382,7 @@ fn units_of_coordinates_momenta_and_globals_do_not_matter() {
             units[j % 4]
         };
     }
-    // Balancing may end a few powers of two away from the units: other round-off, of the same size.
+    // Balancing may choose scales that differ from the units by powers of two: other rounding errors of the same size.
     let singular = assembled(&plain, 0).0.singular_values();
     let tolerance = 1e-14 * singular.max() / singular.min() * largest(&expected);
     assert_close(found.as_slice(), expected.as_slice(), tolerance);
@@ -414,7 +414,8 @@ fn cost_and_storage_are_linear() {
     chain.closure_mut().right[1] = end;
     chain.solve().expect("sin 100 is not zero");
     let middle = chain.node(links / 2);
-    // y = (cos t, −sin t). The round-off of E links, a few ε each, adds up at worst; it is divided by sin 100 = −0.51.
+    // y = (cos t, −sin t). The rounding errors of E links, a few ε each, add up at worst; they are divided by
+    // sin 100 = −0.51.
     let t = angle * (links / 2) as f64;
     assert_close(middle, &[t.cos(), -t.sin()], 2e-15 * links as f64);
     assert_eq!(chain.sweep.length(), (links - 1) * 2 * 7);

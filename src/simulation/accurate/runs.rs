@@ -76,7 +76,7 @@ impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
         }
     }
 
-    /// Takes the stepper for a way from those that are kept, or makes one.
+    /// Takes the stepper with the element and the solver of a run from those that are kept, or creates one.
     fn take_stepper(&mut self, way: &Way<'_>) -> Result<Reusable<R::Stepper>, RunErrorKind> {
         let is_known = |one: &Reusable<R::Stepper>| {
             (one.by_iteration, one.element) == (way.by_iteration, way.element)
