@@ -213,8 +213,7 @@ impl Extent {
         }
     }
 
-    /// The decades from the start to a positive value, by their ratio: the logarithms of nearly equal numbers may be
-    /// equal.
+    /// The decades from the start to a positive value, by their ratio: logarithms of nearly equal numbers may be equal.
     fn decades_to(&self, value: f64) -> f64 {
         let ratio = value / self.start;
         if ratio.is_normal() {
@@ -247,8 +246,7 @@ impl Extent {
         }
     }
 
-    /// About as many labelled ticks as asked for, but at least two, unless there are no two round numbers this close to
-    /// each other.
+    /// About as many labelled ticks as asked for, at least two, unless no two round numbers are this close together.
     pub(super) fn ticks(&self, wanted: usize) -> Vec<Tick> {
         match self.scale {
             Scale::Linear => self.linear_ticks(wanted),
@@ -269,8 +267,7 @@ impl Extent {
 
     fn linear_ticks(&self, wanted: usize) -> Vec<Tick> {
         let wanted = wanted.max(2);
-        // Steps are rounded up by a factor of up to 2.5. If few are asked for, one round number or none may remain;
-        // with five, at least two remain.
+        // Steps are rounded up by a factor of up to 2.5, so that few may leave one tick or none; five leave two.
         let parts = (wanted..5).find(|&parts| self.round_ticks(parts).len() >= 2);
         self.round_ticks(parts.unwrap_or(wanted.max(5)))
     }
@@ -345,8 +342,7 @@ fn round_step(step: f64) -> f64 {
         .unwrap_or(step)
 }
 
-/// The label of a number on an axis whose ticks are `step` apart and at most `largest`, with enough decimals to
-/// distinguish it from its neighbours.
+/// A label on an axis whose ticks are `step` apart and at most `largest`, with as many decimals as distinguish them.
 fn number(value: f64, step: f64, largest: f64) -> String {
     let value = if value.abs() < 1e-9 * step {
         0.0

@@ -208,8 +208,7 @@ where
     /// The largest number of events in one step; with more, events are taken to accumulate (Zeno behaviour).
     const MAX_CUTS: u32 = 1000;
 
-    /// Events are also taken to accumulate if one recurs after so short a time, relative to the step; soon after, the
-    /// motion between two events would be lost in rounding error.
+    /// Events also accumulate if one recurs this soon, relative to the step: later ones are lost in rounding error.
     const SOON: f64 = 1e-6;
 
     /// Replaces the model.
@@ -218,8 +217,7 @@ where
         self.clear.forget();
     }
 
-    /// The inputs of the model have changed. The known signs stay, so that a function that jumps over zero by this
-    /// change is met at once.
+    /// The inputs have changed. Known signs stay, so that a function that jumps over zero by this is met at once.
     pub(super) fn set_inputs(&mut self) {
         self.clear.forget();
     }
@@ -285,8 +283,7 @@ where
         !self.due.is_empty()
     }
 
-    /// Applies the actions at these events, from the state that the last action has left, up to the first that ends the
-    /// element.
+    /// Applies the actions at these events, from the state that the last one has left, up to the first that cuts.
     pub(super) fn pass_due(
         &mut self,
         time: f64,
@@ -378,8 +375,7 @@ where
         Ok(None)
     }
 
-    /// Applies the action at an event at the end of an element of a given length; `None` if the event was only
-    /// recorded.
+    /// Applies the action at an event that ends an element of a given length; `None` if it was only recorded.
     fn meet(
         &mut self,
         Crossed { function, rises }: Crossed,
@@ -431,15 +427,13 @@ where
         Ok(Some(Done { place, after }))
     }
 
-    /// Whether this root is the event that has cut the element before, seen again because the polynomial starts with
-    /// another velocity than the node.
+    /// Whether this is the last event, seen again because the polynomial starts with another velocity than the node.
     fn is_seen_again(&self, arc: &Passage<'_, N, L>, root: &search::Root, time: f64) -> bool {
         let last = self.last_of(root.into(), time);
         last.is_some_and(|last| last.is_idle || self.begins_behind(arc, root))
     }
 
-    /// Whether the root exists only because the polynomial starts on the side from which the function came, while the
-    /// node is already on the other side.
+    /// Whether the root exists only because the polynomial starts before the zero, while the node is already beyond it.
     fn begins_behind(&self, arc: &Passage<'_, N, L>, root: &search::Root) -> bool {
         let before = if root.rises { -1.0 } else { 1.0 };
         let value = |state: &L::State, time: f64, v: &L::Vector| {
