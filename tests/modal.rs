@@ -1,11 +1,12 @@
-//! Modal reduction: frequencies against closed forms, motions against the full model, what has no modes.
+//! Modal reduction: frequencies compared with closed forms, motions with those of the full model, and models without
+//! modes, which are refused.
 
 use std::f64::consts::PI;
 use tfe::modal::ModalError;
 use tfe::prelude::*;
 use tfe::runtime::CoordinateName;
 
-/// Masses in a row between two walls.
+/// A row of masses between two walls.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m/2*dot(q[i])^2 + m*g*q[i])
@@ -20,7 +21,7 @@ struct Row {
     g: f64,
 }
 
-/// Two masses on a spring that nothing holds, and a term that only adds to a momentum.
+/// Two masses joined by a spring and otherwise free, and a term that only adds a constant to a momentum.
 #[dynamics(coordinates(x[2]), lagrangian = m*dot(x[0])^2 + m/2*dot(x[1])^2 + c*dot(x[1]) - k/2*(x[1]-x[0])^2 - m*g*(2*x[0]+x[1]))]
 struct Free {
     m: f64,
@@ -29,7 +30,7 @@ struct Free {
     g: f64,
 }
 
-/// Kinetic energies of products, a Hamiltonian with a drift, coordinates about another point than zero.
+/// Kinetic energies with products, a Hamiltonian with a drift, and coordinates whose equilibrium is not at zero.
 #[dynamics(
     coordinates(x, y), momenta(p, r),
     hamiltonian = p^2/2 + p*r/3 + r^2 + u*p + 2*(x - 1)^2 + x*y/2 + y^2,
@@ -39,7 +40,7 @@ struct Drifting {
     u: f64,
 }
 
-/// A cart on a spring and a body on a spring to it, whose masses the place of the body in the cart couples.
+/// A cart on a spring, and a body on a spring to it; the position of the body in the cart couples their masses.
 #[dynamics(coordinates(cart, body), lagrangian = frame/2*dot(cart)^2 + m/2*(dot(cart) + dot(body))^2 - k/2*cart^2 - c/2*body^2 + f*(cart + body))]
 struct Riding {
     frame: f64,
@@ -58,7 +59,7 @@ fn names(names: &[CoordinateName]) -> Vec<String> {
     names.iter().map(ToString::to_string).collect()
 }
 
-/// 2 √(k/m) sin(jπ/(2(n+1)))
+/// The frequencies in closed form: 2 √(k/m) sin(jπ/(2(n+1))).
 fn frequency(row: &Row, j: usize) -> f64 {
     2.0 * (row.k / row.m).sqrt() * (PI * j as f64 / (2 * (row.n + 1)) as f64).sin()
 }
@@ -71,24 +72,26 @@ fn frequencies_are_those_of_the_closed_form() {
         let exact = frequency(&row, k + 1);
         assert!((found / exact - 1.0).abs() < 1e-12, "{k}: {found} {exact}");
     }
-    // Fewer modes are the lowest of them.
+    // With fewer modes, the lowest ones are found.
     let few: Modal<'_, Row, 3> = Modal::of(&row).unwrap();
     assert_eq!(few.frequencies()[..], modal.frequencies()[..3]);
-    // Shapes are sines of norm one by the mass matrix.
+    // The shapes are sines, normalised by the mass matrix.
     let scale = (2.0 / (row.m * 21.0)).sqrt();
     for k in 0..3 {
         let shape = few.shape(k).unwrap();
         let sine = |i: usize| scale * (PI * ((k + 1) * (i + 1)) as f64 / 21.0).sin();
         let sign = if sine(0) * shape[0] < 0.0 { -1.0 } else { 1.0 };
         for (i, entry) in shape.iter().enumerate() {
-            // Roundings of vectors are those of the matrix over the gap to the next eigenvalue, a sixtieth of the largest.
+            // Rounding errors of eigenvectors are those of the matrix divided by the gap to the next eigenvalue, here a
+            // sixtieth of the largest.
             assert!((entry - sign * sine(i)).abs() < 1e-12, "{k} {i}");
         }
     }
     assert_eq!(few.shape(3), None);
 }
 
-/// A run of one model that goes on with another one, of other frequencies, is that from its checkpoint on.
+/// A run that continues from the checkpoint of another model, with other frequencies, equals a run from the state of
+/// that checkpoint.
 #[test]
 fn modes_go_on_from_a_checkpoint_of_others() {
     let (soft, stiff) = (
@@ -112,7 +115,7 @@ fn modes_go_on_from_a_checkpoint_of_others() {
     let resumed = second.resume(checkpoint, 10.0).unwrap();
     let anew = second.run(*checkpoint.state(), 5.0..10.0).unwrap();
     for k in 0..3 {
-        // Roundings of fifty steps.
+        // The rounding errors of fifty steps.
         assert!((resumed.last().q[k] - anew.last().q[k]).abs() < 1e-13);
         assert!((resumed.last().p[k] - anew.last().p[k]).abs() < 1e-13);
     }
@@ -148,7 +151,7 @@ fn all_modes_together_move_as_the_full_model() {
     }
     assert!((motion.energies()[0] / full.energies()[0] - 1.0).abs() < 1e-12);
     assert!(motion.energy_error() < 1e-12);
-    // Outputs have the names and the values of the full model, those by site too.
+    // The outputs have the names and the values of the full model, including those at each site.
     assert_eq!(
         names(motion.outputs().names()),
         names(full.outputs().names())
@@ -168,17 +171,17 @@ fn all_modes_together_move_as_the_full_model() {
 fn fewer_modes_keep_their_part_of_the_motion() {
     let row = row(30, 0.2);
     let modal: Modal<'_, Row, 2> = Modal::of(&row).unwrap();
-    // A row that hangs at rest is none of its modes.
+    // The position of a row that hangs at rest is no excitation of its modes.
     let hanging = row.state(modal.equilibrium(), vec![0.0; 30]);
     let rest = modal.reduce(&hanging);
     assert!(rest.q.iter().chain(&rest.p).all(|x| x.abs() < 1e-14));
-    // m g / k (j (n + 1 − j)) / 2 is what masses between two walls give way.
+    // The displacement of masses between two walls under their weight is m g / k · j (n + 1 − j) / 2.
     for (i, q) in modal.equilibrium().iter().enumerate() {
         let j = (i + 1) as f64;
         let exact = row.m * row.g / row.k * j * (31.0 - j) / 2.0;
         assert!((q / exact - 1.0).abs() < 1e-12, "{i}: {q} {exact}");
     }
-    // One mode of two moves alone.
+    // An excitation of one of the two modes remains in this mode.
     let start = modal.expand(&State {
         q: [0.0, 0.3],
         p: [0.0; 2],
@@ -206,7 +209,7 @@ fn what_nothing_holds_falls() {
     let modal: Modal<'_, Free, 2, State<2>> = Modal::of(&free).unwrap();
     let [rigid, elastic] = modal.frequencies();
     assert_eq!(rigid, 0.0);
-    // 2m and m on a spring.
+    // The masses 2m and m on a spring.
     assert!((elastic / (free.k * 1.5 / free.m).sqrt() - 1.0).abs() < 1e-14);
     let start = free.state([0.0, 0.1], [0.0; 2]);
     let motion = Simulation::new(&modal).element(Mixed::<6>).step(0.05);
@@ -243,14 +246,15 @@ fn slow_modes_beside_stiff_springs() {
                 f,
             };
             let modal: Modal<'_, Riding, 2, State<2>> = Modal::of(&riding).unwrap();
-            // m²ω⁴ − m (k + 2c) ω² + k c = 0
+            // The frequencies are the roots of m²ω⁴ − m (k + 2c) ω² + k c = 0.
             let sum = k + 2.0 * c + k.hypot(2.0 * c);
             let exact = [(2.0 * (k / sum) * (c / m)).sqrt(), (sum / 2.0 / m).sqrt()];
             for (found, exact) in modal.frequencies().iter().zip(exact) {
                 let error = (found / exact - 1.0).abs();
                 assert!(error < 1e-14, "k = {k}, c = {c}: {found} {exact}");
             }
-            // Pulled until the softer spring holds; what the stiffer one gives way may be less than a rounding of that.
+            // The softer spring carries the force. The displacement of the stiffer one may be less than a rounding
+            // error of that of the softer one, and is not compared.
             let (softer, spring) = if k <= c { (0, k) } else { (1, c) };
             let found = modal.equilibrium()[softer];
             let error = (found * spring / f - 1.0).abs();
@@ -284,7 +288,7 @@ fn rigid_and_growing_modes_beside_stiff_springs() {
             f,
         };
         let modal: Modal<'_, Riding, 2, State<2>> = Modal::of(&riding).unwrap();
-        // The stiff spring is a rod.
+        // The stiff spring is close to a rod.
         let exact = -(1.0 / mass).sqrt();
         let error = (modal.frequencies()[0] / exact - 1.0).abs();
         assert!(error < 1e-14, "k = {k}, c = {c}");
@@ -386,7 +390,7 @@ fn what_has_no_modes() {
         },
         &ModalError::NotFinite,
     );
-    // The mass matrix is singular; the last pivot is zero, or a rounding of either sign.
+    // The mass matrix is singular: its last pivot is zero, or a rounding error of either sign.
     for m in [0.3, 0.5, 0.7, 1.0, 2.0, 7.0] {
         let (frame, c, f) = (0.0, 1.0, 0.0);
         check(&Riding { frame, m, k, c, f }, &ModalError::MassNotPositive);
@@ -427,7 +431,8 @@ fn modes_are_rungs() {
         .repeat_for(std::time::Duration::ZERO)
         .run()
         .unwrap();
-    // At the last mass the third shape is sin 3x/sin x times the first, x = π/17: 2.97. Both motions begin at their largest.
+    // At the last mass, the shape of the third mode is sin 3x/sin x = 2.97 times that of the first, x = π/17. Both
+    // motions have their maximum at the start.
     let error = ladder.rungs()[0].model_error().unwrap();
     let ratio = 1e-3 * (3.0 * PI / 17.0).sin() / (PI / 17.0).sin();
     assert!((error / ratio - 1.0).abs() < 0.1, "{error:e} {ratio:e}");

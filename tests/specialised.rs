@@ -1,4 +1,4 @@
-//! Emitted solvers beside the generic path: the same numbers.
+//! Emitted solvers compared with the general stepper: they give the same numbers.
 
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};
@@ -38,7 +38,7 @@ struct Oscillator {
     c: f64,
 }
 
-/// A stiff joint: equations of second order, with friction.
+/// A stiff joint: equations of second order with friction.
 #[dynamics(
     coordinates(a, b),
     lagrangian = (dot(a)^2 + dot(b)^2)/2 - k/2*(a - b)^2 - k/4*(a - b)^4 + cos(a),
@@ -50,7 +50,7 @@ struct Blade {
     c: f64,
 }
 
-/// Fields of which formulas know nothing: the solver keeps copies.
+/// Fields that do not occur in formulas: the solver keeps a copy of them.
 #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/4*x^4, solver(OfNamed, Mixed::<3>))]
 struct Named {
     m: f64,
@@ -60,7 +60,7 @@ struct Named {
     _note: Option<&'static str>,
 }
 
-/// A hundred steps both ways, every coordinate and momentum the same to the last bit.
+/// A hundred steps with both: all coordinates and momenta must agree to the last bit.
 macro_rules! same {
     ($model:expr, $start:expr, $solver:ident, $element:expr, $h:expr) => {{
         let (model, start, h): (_, _, f64) = (&$model, $start, $h);
@@ -142,7 +142,7 @@ fn the_same_numbers_where_the_model_has_other_fields() {
     same!(named, start, OfNamed, Element::mixed(3), 0.05);
 }
 
-/// Steps so long that the fixed point is given up, and taken up again later.
+/// Steps so long that the fixed-point iteration is replaced by Newton's method, and later tried again.
 #[test]
 fn the_same_numbers_where_the_fixed_point_does_not_contract() {
     let links = Links { g: 9.81, c: 0.2 };

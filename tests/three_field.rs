@@ -1,4 +1,4 @@
-//! The three-field element, and the two forms that it holds as special cases.
+//! The three-field element, and the two other forms that are its special cases.
 
 #[path = "common/largest.rs"]
 mod largest;
@@ -6,7 +6,7 @@ mod largest;
 use largest::larger;
 use tfe::prelude::*;
 
-/// A pendulum on an elastic rod, damped.
+/// A damped pendulum on an elastic rod.
 #[dynamics(
     coordinates(r, phi),
     lagrangian = (dot(r)^2 + r^2*dot(phi)^2)/2 + g*r*cos(phi) - k/2*(r - 1)^2,
@@ -18,7 +18,7 @@ struct Spring {
     c: f64,
 }
 
-/// The same by its Hamiltonian.
+/// The same as a Hamiltonian.
 #[dynamics(
     coordinates(r, phi),
     momenta(pr, pphi),
@@ -31,7 +31,8 @@ struct SpringByMomenta {
     c: f64,
 }
 
-/// A rotor in unit quaternions: the kinetic energy does not see the rate along e, its second derivative is singular.
+/// A rotor described by unit quaternions: the kinetic energy does not depend on the rate of change of |e|, so that its
+/// second derivative is singular.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -75,12 +76,13 @@ fn difference<M: Model<2>, L: Model<2>>(
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, larger) / 2.0
 }
 
-/// Its velocity is the rate of the coordinates: the primal form of the same rule. With n − 1 points that is the mixed form.
+/// If its velocity is the rate of the coordinates it is the primal form with the same quadrature; with n − 1 points it
+/// is the mixed form.
 #[test]
 fn primal_and_mixed_are_special_cases() {
     for n in 2..=6 {
         let element = Element::three_field(n);
-        // The same equations up to the order of sums, 40 steps.
+        // The equations are the same except for the order of sums; 40 steps.
         let cases = [
             (Element::mixed(n), element),
             (Element::primal(n), element.quadrature(n)),
@@ -90,13 +92,14 @@ fn primal_and_mixed_are_special_cases() {
             let found = difference((&SPRING, three_field), (&SPRING, special));
             assert!(found < 1e-13, "{three_field} {special}: {found:e}");
         }
-        // Of a Hamiltonian the velocities become unknowns, momenta follow point by point.
+        // For a Hamiltonian, velocities become unknowns and momenta follow point by point.
         let found = difference((&BY_MOMENTA, element), (&SPRING, Element::mixed(n)));
         assert!(found < 1e-12, "{element} by momenta: {found:e}");
     }
 }
 
-/// A singular mass matrix, held by the constraint: Euler's free body keeps its angular momentum in space, and its energy.
+/// A singular mass matrix that becomes regular with the constraint: Euler's free body conserves its angular momentum in
+/// space and its energy.
 #[test]
 fn a_singular_mass_matrix_runs() {
     let rotor = Rotor {
@@ -112,7 +115,7 @@ fn a_singular_mass_matrix_runs() {
         .run(start, 0.0..20.0)
         .unwrap();
     assert!(motion.constraint_residual().position < 1e-14);
-    // Order 8 at this step.
+    // The energy error of an element of order 8 with this step.
     assert!(motion.energy_error() < 1e-9, "{:e}", motion.energy_error());
     let same = Simulation::new(&rotor)
         .element(Mixed::<5>)
@@ -124,7 +127,7 @@ fn a_singular_mass_matrix_runs() {
     }
 }
 
-/// About an equilibrium it is as stable as the mixed element.
+/// Linearised about an equilibrium it has the stability of the mixed element.
 #[test]
 fn stable_at_every_step() {
     let rest = SPRING.state([1.0 + 9.81 / 30.0, 0.0], [0.0, 0.0]);

@@ -1,4 +1,4 @@
-//! Steps that are equal in a time τ of their own, dt = g dτ.
+//! Time transformations: steps that are equal in a fictitious time τ with dt = g dτ.
 
 #[path = "common/largest.rs"]
 mod largest;
@@ -8,7 +8,8 @@ use std::f64::consts::{PI, TAU};
 
 use tfe::prelude::*;
 
-/// Kepler's problem with g = r^k; k = 0 leaves the time as it is, and k = 1 makes τ the eccentric anomaly where the semi-major axis is 1.
+/// The Kepler problem with g = r^k. For k = 0, τ is the time; for k = 1 and semi-major axis 1, τ is the eccentric
+/// anomaly.
 #[dynamics(
     coordinates(x, y),
     momenta(px, py),
@@ -22,7 +23,7 @@ struct Kepler {
     k: f64,
 }
 
-/// A pendulum that is driven and damped, in its own time.
+/// A driven and damped pendulum in physical time.
 #[dynamics(
     coordinates(q),
     momenta(p),
@@ -37,7 +38,7 @@ struct Driven {
     c: f64,
 }
 
-/// The same with short steps where the angle is large.
+/// The same with a time transformation that makes steps short where the angle is large.
 #[dynamics(
     coordinates(q),
     momenta(p),
@@ -55,7 +56,7 @@ struct Slowed {
     c: f64,
 }
 
-/// From the pericentre of an ellipse with semi-major axis 1 and eccentricity e.
+/// The initial state at the pericentre of an ellipse with semi-major axis 1 and eccentricity e.
 fn ellipse(kepler: &Kepler, e: f64) -> State<3> {
     kepler.state([1.0 - e, 0.0], [0.0, ((1.0 + e) / (1.0 - e)).sqrt()])
 }
@@ -74,7 +75,7 @@ fn eccentric_anomaly(e: f64, t: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Position and momentum at the time t from the pericentre.
+/// Position and momentum at the time t after the pericentre.
 fn on_ellipse(e: f64, t: f64) -> ([f64; 2], [f64; 2]) {
     let (sin, cos) = eccentric_anomaly(e, t.rem_euclid(TAU)).sin_cos();
     let (b, rate) = ((1.0 - e * e).sqrt(), 1.0 / (1.0 - e * cos));
@@ -91,7 +92,7 @@ fn run(kepler: &Kepler, element: Element, step: f64, e: f64, end: f64) -> Motion
     motion.expect("steps short enough to be solved")
 }
 
-/// |H + ½| at the nodes.
+/// The energy error |H + ½| at the nodes.
 fn energy_errors(motion: &Motion<3>) -> Vec<f64> {
     let rows = (0..motion.states().len()).filter_map(|node| motion.outputs().row(node));
     rows.map(|row| (row[0] + 0.5).abs()).collect()
@@ -101,7 +102,7 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, larger)
 }
 
-/// The power of 2 by which errors fall from one entry to the next.
+/// The observed orders: log₂ of the ratios of successive errors.
 fn powers(errors: &[f64]) -> Vec<f64> {
     errors
         .windows(2)
@@ -109,7 +110,7 @@ fn powers(errors: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// τ, with dt = r^k dτ, of one revolution; the midpoint rule converges exponentially.
+/// The length of one revolution in τ, with dt = r^k dτ; the midpoint rule converges exponentially.
 fn revolution(e: f64, k: f64) -> f64 {
     let points = 4000;
     let h = TAU / f64::from(points);
@@ -154,9 +155,9 @@ fn the_energy_of_a_thin_ellipse_does_not_drift() {
     let (first, last) = (largest(first), largest(last));
     println!("1000 orbits of 100 steps: {first:.3e} in the first tenth, {last:.3e} in the last");
     assert!(last <= 2.0 * first, "{last:e} after {first:e}");
-    // Measured: 1.2e-7. The distance at the pericentre is 0.01, the largest kinetic energy 99.5.
+    // Measured: 1.2e-7. The distance at the pericentre is 0.01, and the largest kinetic energy 99.5.
     assert!(first < 2.5e-7, "{first:e}");
-    // p_t is a constant of the motion, and no step changes it.
+    // p_t is constant for this motion, and no step changes it.
     assert_eq!(motion.last().p[2], motion.states()[0].p[2]);
 }
 
@@ -176,12 +177,12 @@ fn a_rate_like_the_period_resolves_a_thin_ellipse_to_rounding() {
     println!(
         "g = r^(3/2), 100 orbits of 100 steps: energy {error:.2e}, time of the orbits {time:.2e}"
     );
-    // Measured: 2.3e-12 and 2.8e-11, of energies up to 99.5 and a time of 628.
+    // Measured: 2.3e-12 and 2.8e-11, with energies up to 99.5 and a time of 628.
     assert!(error < 1e-11, "{error:e}");
     assert!(time.abs() < 1e-10, "{time:e}");
 }
 
-/// Largest error of the energy, and error of the position at the end.
+/// The largest energy error, and the error of the position at the end.
 fn errors_of_one_orbit(k: f64, steps: usize) -> Option<[f64; 2]> {
     let kepler = Kepler { k };
     let step = TAU / steps as f64;
@@ -189,7 +190,7 @@ fn errors_of_one_orbit(k: f64, steps: usize) -> Option<[f64; 2]> {
         .element(Mixed::<5>)
         .step(step)
         .run(ellipse(&kepler, 0.99), 0.0..TAU);
-    // Some steps of the time itself are too long to be solved.
+    // Without the transformation, some steps are too long to be solved.
     let motion = simulation.ok()?;
     let last = motion.last();
     let (q, _) = on_ellipse(0.99, last.q[2]);
@@ -215,12 +216,13 @@ fn a_hundredth_of_the_steps_does() {
             "{what}: {steps} steps of r dτ {:.2e}, {plain} of dt {error:.2e}",
             own[part]
         );
-        // Measured: 25600 and 51200, where half as many are not enough.
+        // Measured: 25 600 and 51 200 equal steps; half as many are not enough.
         assert!(plain >= 100 * steps, "{what}: {plain} steps do");
     }
 }
 
-/// The motion in τ and the plain one to the same time t: largest difference of (q, p), and the largest |H + p_t|.
+/// Compares the motion in τ with the one in t, up to the same time t: the largest difference of (q, p), and the largest
+/// |H + p_t|.
 fn differences(c: f64) -> (f64, f64) {
     let (a, w, start) = (0.4, 1.3, 0.7);
     let slowed = Slowed { a, w, c };
@@ -243,7 +245,7 @@ fn differences(c: f64) -> (f64, f64) {
     });
     let balance = balance.fold(0.0, larger);
     println!("c = {c}: t = {end}, difference {difference:.2e}, |H + p_t| {balance:.2e}");
-    // Outputs know the time of the model, and rates are those of that time.
+    // Outputs are evaluated at the physical time, and rates are derivatives by it.
     let node = motion.states().len() - 1;
     let outputs = motion.outputs().row(node).expect("a row for each node");
     assert_eq!(outputs[0], a * (w * end).cos());
@@ -256,7 +258,7 @@ fn differences(c: f64) -> (f64, f64) {
 #[test]
 fn a_driven_pendulum_moves_as_it_does_without() {
     let (difference, balance) = differences(0.0);
-    // Measured: 1.2e-14 and 3.2e-15, rounding that this motion may enlarge a little.
+    // Measured: 1.2e-14 and 3.2e-15, which are rounding errors, slightly amplified by the motion.
     assert!(difference < 1e-11, "{difference:e}");
     assert!(balance < 1e-11, "{balance:e}");
 }
@@ -264,7 +266,8 @@ fn a_driven_pendulum_moves_as_it_does_without() {
 #[test]
 fn damping_takes_its_power_from_the_energy() {
     let (difference, balance) = differences(0.1);
-    // Measured: 5.4e-15 and 1.4e-15. Without the power on p_t the balance would be the energy that damping has taken, of order one.
+    // Measured: 5.4e-15 and 1.4e-15. Without the power of the forces in the equation of p_t, the second value would be
+    // the dissipated energy, of order one.
     assert!(difference < 1e-11, "{difference:e}");
     assert!(balance < 1e-11, "{balance:e}");
 }
@@ -278,7 +281,7 @@ fn states_hold_the_time_and_minus_the_energy() {
     let energy = p * p / 2.0 - q.cos() - a * q * (w * t).cos();
     assert_eq!(state.q, [q, t]);
     assert_eq!(state.p[0], p);
-    // A few operations, each rounded once.
+    // A few operations, each with one rounding error.
     assert!((state.p[1] + energy).abs() < 4.0 * f64::EPSILON);
     assert_eq!(slowed.state([q], [p]), slowed.state_at(0.0, [q], [p]));
     assert_eq!(Kepler::structure().cyclic, ["t"]);
@@ -297,7 +300,7 @@ fn solvers_and_columns_know_the_time() {
     }
     let simulation = Simulation::new(&slowed).element(Mixed::<5>).step(0.1);
     let motion = simulation.run(start, 0.0..1.0).expect("a motion");
-    // Iterations end below 1e-13 of the state.
+    // Iterations stop below 1e-13 of the state.
     assert!((state.q[1] - motion.last().q[1]).abs() < 1e-12);
     let path = std::env::temp_dir().join(format!("tfe_clock_{}.csv", std::process::id()));
     motion.write_csv(&path).expect("a writable folder");

@@ -1,4 +1,4 @@
-//! Steps that are short where the motion is fast, and runs over given nodes.
+//! Variable step sizes, short where the motion is fast, and runs over given nodes.
 
 #[path = "common/largest.rs"]
 mod largest;
@@ -14,14 +14,16 @@ struct VanDerPol {
 
 const STIFF: VanDerPol = VanDerPol { mu: 1000.0 };
 
-/// At t = 2000 from (2, 0): the reference of the test set for initial value problems (problem `vdpol`, in units of μ), Radau 5 there.
+/// Reference at t = 2000 from (2, 0), from the test set for initial value problems (problem `vdpol`, in units of μ),
+/// computed there by Radau 5.
 const STIFF_END: (f64, f64) = (1.706_167_732_170_483, -0.892_809_701_024_797_5e-3);
 
 fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
     numbers.fold(0.0, |most, x| larger(most, x.abs()))
 }
 
-/// The error at the end as it is estimated: over the largest coordinate and the largest momentum of the motion.
+/// The error at the end in the norm of the estimates: relative to the largest coordinate and the largest momentum of
+/// the motion.
 fn true_error(motion: &Motion<1>, (q, p): (f64, f64)) -> f64 {
     let states = || motion.states().iter();
     let off_q = (motion.last().q[0] - q).abs() / largest(states().map(|node| node.q[0]));
@@ -33,7 +35,7 @@ fn steps(motion: &Motion<1>) -> usize {
     motion.states().len() - 1
 }
 
-/// The shortest and the longest step.
+/// The shortest and the longest step size.
 fn extremes(motion: &Motion<1>) -> (f64, f64) {
     let nodes = motion.states().windows(2);
     let lengths = nodes.map(|pair| (pair[1].t - pair[0].t).abs());
@@ -49,7 +51,7 @@ fn relaxation(accuracy: f64) -> Estimated<Motion<1>> {
         .expect("two jumps")
 }
 
-/// Steps of a ten-thousandth in the jumps, of hundreds between them: equal ones would be millions.
+/// Step sizes are a ten-thousandth in the jumps and hundreds between them; with equal steps there would be millions.
 #[test]
 fn relaxation_oscillations_are_met() {
     for digits in [2, 4, 6, 8, 10] {
@@ -67,18 +69,19 @@ fn relaxation_oscillations_are_met() {
             "{accuracy}: {error}, {estimate}"
         );
         let (shortest, longest) = extremes(&motion);
-        // Lengths are differences of nodes.
+        // Step sizes are differences of nodes, with their rounding errors.
         assert!((picked.shortest - shortest).abs() < 1e-6 * shortest && picked.varies());
         assert!((picked.step - longest).abs() < 1e-6 * longest);
         assert!(longest > 1e5 * shortest, "{shortest}, {longest}");
         assert!((steps(&motion) as f64) < 0.01 * 2000.0 / shortest);
-        // The momentum there is a millionth of that in the jumps, and right by its own measure.
+        // The momentum at the end is a millionth of that in the jumps; it is accurate relative to its own size as well.
         let (_, p) = STIFF_END;
         assert!((motion.last().p[0] / p - 1.0).abs() < 10.0 * accuracy);
     }
 }
 
-/// The same as equations of first order, declared by H = p·f: a Hamiltonian is no proof of slow motion.
+/// The same as equations of first order, declared by H = p·f. That a model is a Hamiltonian one must not be taken for a
+/// reason to use equal steps.
 #[dynamics(
     coordinates(x, v), momenta(px, pv),
     hamiltonian = px*v + pv*(mu*(1 - x^2)*v - x),
@@ -109,7 +112,7 @@ fn equations_of_first_order_have_them_too() {
     }
 }
 
-/// Robertson's reaction, whose rates differ by nine powers of ten, declared by H = p·f.
+/// Robertson's reaction, whose rate constants differ by nine orders of magnitude, declared by H = p·f.
 #[dynamics(
     coordinates(a, b, c), momenta(pa, pb, pc),
     hamiltonian = pa*(1e4*b*c - 0.04*a) + pb*(0.04*a - 1e4*b*c - 3e7*b^2) + pc*3e7*b^2,
@@ -143,7 +146,7 @@ fn a_stiff_reaction_takes_few_steps() {
     }
 }
 
-/// What is recorded is a motion as any other: between nodes, and as the mesh of another run.
+/// The recorded motion can be used like any other: evaluated between nodes, and as the mesh of another run.
 #[test]
 fn nodes_of_one_run_serve_another() {
     let motion = relaxation(1e-6);
@@ -166,7 +169,7 @@ fn nodes_of_one_run_serve_another() {
         let error = true_error(&again, STIFF_END);
         assert!(error < 1e-6, "{element}: {error}");
     }
-    // On the slow branches x³/3 − x + … changes at the rate of time: v = x/(μ (1 − x²)) up to 1/μ³.
+    // On the slow branches the velocity is v = x/(μ (1 − x²)), with an error of the order of 1/μ³.
     for t in [100.0, 500.0, 1000.0, 1900.0] {
         let node = motion.at(t).expect("inside");
         let [x] = node.q;
@@ -179,7 +182,7 @@ fn nodes_of_one_run_serve_another() {
     }
 }
 
-/// From gentle to stiff, against steps so short that only roundings are left.
+/// From nonstiff to stiff, compared with steps so short that only rounding errors are left.
 #[test]
 fn less_stiff_ones_are_met_too() {
     for (mu, end) in [(1.0, 20.0), (5.0, 60.0), (30.0, 120.0)] {
@@ -231,7 +234,8 @@ struct Duffing {
     w: f64,
 }
 
-/// A force that ends at thirty, an impulse at forty: both are nodes, and the accuracy is met behind them, forwards and backwards.
+/// A force that ends at t = 30 and an impulse at t = 40: both times are nodes, and the accuracy is met after them,
+/// forwards and backwards in time.
 #[test]
 fn breaks_and_impulses_stay_nodes() {
     let model = Duffing {
@@ -253,7 +257,7 @@ fn breaks_and_impulses_stay_nodes() {
             motion.picked().expect("picked")
         );
         assert!(error <= accuracy, "{accuracy}: {error}");
-        // No crumbs beside them.
+        // There are no tiny steps next to them.
         assert!(motion.picked().expect("picked").shortest > 1e-3);
         for time in [30.0, 40.0] {
             assert!(motion.states().iter().any(|node| node.t == time), "{time}");
@@ -264,7 +268,7 @@ fn breaks_and_impulses_stay_nodes() {
 #[dynamics(coordinates(q), lagrangian = dot(q)^2/2 + cos(q))]
 struct Pendulum;
 
-/// A conservative motion has equal steps, whether others are forbidden or not.
+/// For conservative motions steps are equal, whether variable ones are forbidden or not.
 #[test]
 fn conservative_models_keep_equal_steps() {
     let start = Pendulum.state([3.1], [0.0]);
@@ -281,7 +285,8 @@ fn conservative_models_keep_equal_steps() {
     }
 }
 
-/// Nodes by hand: equal ones are steps, others end where they are told, with breaks among them; as a mesh to start from when an accuracy is asked for.
+/// Nodes given by hand: equal ones give the same as a step size, others end where they should, with breaks among them;
+/// they also serve as the first mesh of a run with an accuracy.
 #[test]
 fn nodes_are_what_they_are_told() {
     let start = Pendulum.state([2.0], [0.0]);
@@ -347,7 +352,7 @@ fn nodes_that_are_none_are_refused() {
     }
 }
 
-/// A step given before is the longest one, an element given before stays.
+/// A step size set before is the largest one allowed, and an element set before is kept.
 #[test]
 fn what_was_chosen_before_stays() {
     let simulation = Simulation::new(&STIFF).element(Radau::<6>).step(20.0);
@@ -374,7 +379,7 @@ struct Row {
     mu: f64,
 }
 
-/// The same for a row of them, in models of run-time length.
+/// The same for a row of oscillators as a model of run-time length.
 #[test]
 fn families_have_them_too() {
     let row = Row {

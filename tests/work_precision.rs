@@ -1,4 +1,4 @@
-//! Accuracy against cost: slopes, floors, failures, fronts, files.
+//! Work–precision diagrams: slopes, rounding floors, failures, Pareto fronts, files.
 
 mod common;
 
@@ -10,7 +10,7 @@ use tfe::work_precision::{
     Cost, Curve, Measurements, PeerRun, Point, Reference, SaveError, WorkPrecisionError,
 };
 
-/// H = p²/2 − cos q
+/// A pendulum, H = p²/2 − cos q.
 #[dynamics(coordinates(q), momenta(p), hamiltonian = p^2/2 - cos(q))]
 struct Pendulum {}
 
@@ -26,7 +26,7 @@ struct RodPendulum {
     g: f64,
 }
 
-/// The start of the table's pendulum, and its state at t = 10, known to 32 digits.
+/// The initial state of the pendulum in the table of references, and its state at t = 10 with 32 digits.
 const START: State<1> = State { q: [2.0], p: [0.0] };
 
 fn end_of_table() -> State<1> {
@@ -45,7 +45,7 @@ fn end_of_table() -> State<1> {
 }
 
 fn pendulum(model: &Pendulum) -> WorkPrecision<'_, Pendulum, State<1>> {
-    // Counts and errors are tested, not times.
+    // The tests check counts and errors, not times.
     WorkPrecision::new(model, START, 0.0..10.0).repeat_for(Duration::ZERO)
 }
 
@@ -53,7 +53,7 @@ fn halved(from: f64, count: i32) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| from * 0.5_f64.powi(k))
 }
 
-/// One pendulum, two elements of order 4 and one of order 10.
+/// One pendulum with two elements of order 4 and one of order 10.
 fn measured() -> Measurements {
     let model = Pendulum {};
     let problem = pendulum(&model)
@@ -73,7 +73,7 @@ fn slopes_are_the_orders() {
             assert!((slope.exponent - 4.0).abs() < 0.3, "{slope:?}");
             assert!(slope.points >= 3, "{slope:?}");
         }
-        // The shortest step, 0.00625, is still far from round-off.
+        // The error of the shortest step, 0.00625, is still far above rounding.
         assert_eq!(curve.floor(), None);
     }
     let model = Pendulum {};
@@ -87,7 +87,7 @@ fn slopes_are_the_orders() {
 #[test]
 fn high_orders_end_at_a_floor_of_round_off() {
     let floor = measured().curves()[2].floor().unwrap();
-    // Some roundings of 1600 steps at most.
+    // The floor is a few rounding errors of up to 1600 steps.
     assert!(floor < 1e-13, "{floor:e}");
 }
 
@@ -109,7 +109,8 @@ fn the_computed_reference_is_that_of_the_table() {
     assert_eq!(computed.points().count(), given.points().count());
     for (a, b) in computed.points().zip(given.points()) {
         let (a, b) = (a.measured().unwrap(), b.measured().unwrap());
-        // The scales differ: the largest state of ten, or of start and end. Both momenta are within a factor two.
+        // The errors have different scales, the largest state of ten or of start and end; both momenta are within a
+        // factor of two.
         assert!((a.error_q - b.error_q).abs() < 1e-13 + 0.2 * b.error_q);
         assert!(a.error_p < 2.0 * b.error_p && b.error_p < 2.0 * a.error_p);
     }
@@ -117,7 +118,8 @@ fn the_computed_reference_is_that_of_the_table() {
 
 #[test]
 fn a_reference_is_checked_by_steps_that_differ() {
-    // Nodes to compare at every 0.01: of steps 0.1, 0.05 and 0.025 none would fit between them, and three equal runs prove nothing.
+    // Times to compare every 0.01: steps of 0.1, 0.05 and 0.025 would have no nodes at most of them, and equal runs
+    // would prove nothing.
     let model = Quartic { k: 1e6 };
     let measured = WorkPrecision::new(&model, model.state([1.0], [0.0]), 0.0..0.1)
         .element(Mixed::<6>)
@@ -128,7 +130,7 @@ fn a_reference_is_checked_by_steps_that_differ() {
     let Reference::Computed { step, .. } = *measured.reference() else {
         panic!("{:?}", measured.reference());
     };
-    // A period is 0.0074.
+    // The period is 0.0074.
     assert!(step < 0.007, "{step}");
     let fine = measured.points().last().and_then(Point::error);
     assert!(fine.unwrap() < 1e-8, "{measured:?}");
@@ -136,7 +138,7 @@ fn a_reference_is_checked_by_steps_that_differ() {
 
 #[test]
 fn errors_against_a_function_are_relative_and_include_those_on_the_way() {
-    // x'' = −x from (1, 0).
+    // The oscillator x'' = −x from (1, 0).
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2)]
     struct Oscillator {}
     let model = Oscillator {};
@@ -148,9 +150,10 @@ fn errors_against_a_function_are_relative_and_include_those_on_the_way() {
         .run()
         .unwrap();
     let point = measured.points().next().unwrap().measured().unwrap();
-    // The midpoint rule is a rotation by 2 atan(h/2) a step: behind by h²/12 · t, here 0.0025 at the end.
+    // The midpoint rule rotates by 2 atan(h/2) per step, and therefore has a phase error of h²/12 · t, here 0.0025 at
+    // the end.
     let behind = 3.0 - 30.0 * 2.0 * 0.05_f64.atan();
-    // |q_ref| is one at the start, |p_ref| largest at t = 1.5 among the times compared.
+    // The scales: |q_ref| is one at the start, and |p_ref| is largest at t = 1.5 among the times compared.
     let scale = 1.5_f64.sin();
     let (q, p) = (
         (3.0 - behind).cos() - 3.0_f64.cos(),
@@ -158,7 +161,7 @@ fn errors_against_a_function_are_relative_and_include_those_on_the_way() {
     );
     assert!((point.error_q - q.abs()).abs() < 1e-13);
     assert!((point.error_p - p.abs() / scale).abs() < 1e-13);
-    // Behind by the same fraction, the coordinate is off most where it moves fastest.
+    // With the same phase error, the error of the coordinate is largest where it moves fastest.
     assert!(point.max_error_q > 2.0 * point.error_q);
     assert!(point.energy_error < 1e-13);
     assert_eq!((point.statistics.steps, point.repetitions), (30, 1));
@@ -188,7 +191,7 @@ fn runs_that_fail_are_kept_and_the_others_made() {
         Err(RunErrorKind::Solve { element: 0, .. })
     ));
     assert_eq!((failed.step, failed.error()), (0.05, None));
-    // ω = 847 at this amplitude: an error of order 4 is below (hω)⁴ ωt = 4e-3.
+    // The frequency is 847 at this amplitude. An error of order 4 is below (hω)⁴ ωt = 4e-3.
     assert!(good.error().unwrap() < 4e-3, "{measured:?}");
     assert_eq!(
         measured.failures().count(),
@@ -229,7 +232,7 @@ fn a_front_is_a_front() {
             assert!(beaten, "{cost} {error}");
         }
     }
-    // Of order 4 and of order 10 with as many steps, the second reaches 1e-10 first.
+    // Of elements of order 4 and order 10 with the same numbers of steps, the second one reaches 1e-10 first.
     let best = measured
         .against(Cost::Steps)
         .fastest(1e-10)
@@ -258,12 +261,13 @@ fn points_at_the_floor_of_the_reference_are_marked() {
     for (_, one) in curve.measured() {
         assert_eq!(one.at_reference_floor, one.error() <= 1e-6);
     }
-    // Below what the reference knows nothing is promised.
+    // Errors below the accuracy of the reference are never reported as reached.
     assert!(curve.fastest(1e-7).is_none() && measured.fastest(1e-7).is_none());
     assert!(curve.fastest(1e-5).is_some());
 }
 
-/// A pendulum that begins level and at rest has an energy of 6e-17 by rounding, beside which changes of 1e-9 would be enormous.
+/// A pendulum that starts horizontally and at rest has an energy of 6e-17 by rounding; relative to that, energy errors
+/// of 1e-9 would be enormous.
 #[test]
 fn changes_beside_an_energy_that_is_a_rounding_are_absolute() {
     let model = Pendulum {};
@@ -280,7 +284,7 @@ fn changes_beside_an_energy_that_is_a_rounding_are_absolute() {
     let run = Simulation::new(&model).element(Mixed::<4>).step(0.1);
     let motion = run.run(start, 0.0..10.0).unwrap();
     assert!(motion.energies()[0] != 0.0 && motion.energy_error() < 1e-6);
-    // All nodes are looked at: roundings of a hundred steps, of energies of one.
+    // The errors at all nodes: rounding errors of a hundred steps with energies of order one.
     let told = measured.curves()[0].points()[0].measured().unwrap();
     let off = (told.energy_error - motion.energy_error()).abs();
     assert!(off < 1e-13, "{off:e}");
@@ -306,7 +310,7 @@ fn constrained_models_have_their_residual() {
         .unwrap();
     for point in measured.points() {
         let one = point.measured().unwrap();
-        // Solved to round-off: lengths are of one, velocities below five.
+        // Solved up to rounding; lengths are one, and velocities below five.
         assert!((0.0..1e-12).contains(&one.constraint_position), "{one:?}");
         assert!((0.0..1e-11).contains(&one.constraint_velocity), "{one:?}");
         assert!(one.constraint_position + one.constraint_velocity > 0.0);
@@ -441,7 +445,7 @@ fn backwards_and_with_a_shorter_last_step() {
         .unwrap();
     let errors: Vec<_> = measured.points().filter_map(Point::error).collect();
     assert_eq!(errors.len(), 2);
-    // Order 6: the quotient of the steps to that power is 6000.
+    // Order 6: the ratio of the step sizes to the power 6 is 6000.
     assert!(
         errors[0] < 1e-3 && errors[1] < errors[0] / 1000.0,
         "{errors:?}"
@@ -453,7 +457,7 @@ fn backwards_and_with_a_shorter_last_step() {
     assert_eq!(steps, [Some(34.0), Some(143.0)]);
 }
 
-/// Leapfrog for the table's pendulum, with a clock that always says the same.
+/// Leapfrog for the pendulum of the table, with a clock that always returns the same time.
 fn leapfrog(step: f64) -> PeerRun<State<1>> {
     let (mut end, steps) = (START, (10.0 / step).round() as u64);
     for _ in 0..steps {
@@ -495,11 +499,11 @@ fn other_integrators_stand_beside_ours() {
         .iter()
         .map(|point| point.measured().unwrap().error())
         .collect();
-    // Order two, by tenths of the step; the coarsest is not quite in the limit.
+    // Order two, with step sizes a factor of ten apart; with the longest step the error is not quite asymptotic.
     for pair in errors.windows(2) {
         assert!((pair[0] / pair[1] / 100.0 - 1.0).abs() < 0.1, "{errors:?}");
     }
-    // The error is that of the same formula as ours: against the table, relative to the larger of start and end.
+    // The error has the same definition as ours: compared with the table, relative to the larger of start and end.
     let (known, run) = (end_of_table(), leapfrog(0.01));
     let one = peer.points()[1].measured().unwrap();
     let expected = (run.end.p[0] - known.p[0]).abs() / known.p[0].abs();
@@ -507,7 +511,7 @@ fn other_integrators_stand_beside_ours() {
     assert_eq!((one.evaluations, one.seconds), (1000, 1e-3));
     assert_eq!(none.failed(), 1);
     assert!(none.points()[0].outcome.is_err());
-    // At equal or better error the cheapest, and none below what it reaches.
+    // The cheapest run with an error at most that large, and none for smaller errors than it reaches.
     let (found, point) = measured.fastest_peer(errors[1]).unwrap();
     assert_eq!((found.name(), point.setting), (peer.name(), 0.01));
     assert!(measured.fastest_peer(errors[2] / 2.0).is_none());
@@ -518,7 +522,7 @@ fn other_integrators_stand_beside_ours() {
             .windows(2)
             .all(|pair| pair[0].0 < pair[1].0 && pair[0].1 > pair[1].1)
     );
-    // Ours are what they would be alone.
+    // Our results are the same with and without the peer.
     assert!(
         measured
             .front()
@@ -526,7 +530,7 @@ fn other_integrators_stand_beside_ours() {
             .all(|point| point.element == Element::mixed(3))
     );
     assert!(measured.clone().without_peers().peers().is_empty());
-    // Nothing counts a peer's iterations.
+    // The iterations of a peer are not counted.
     assert!(
         measured
             .against(Cost::Iterations)
@@ -546,7 +550,7 @@ fn other_integrators_are_repeated_as_ours_are() {
         .run()
         .unwrap();
     let one = *measured.peers()[0].points()[0].measured().unwrap();
-    // A millisecond of runs that say they took a tenth of it.
+    // The runs repeat for a millisecond, as each of them says that it takes a tenth of that.
     assert_eq!((one.repetitions, one.seconds), (10, 1e-4));
 }
 
@@ -555,7 +559,7 @@ fn other_integrators_are_in_the_files() {
     let measured = beside_leapfrog();
     let csv = measured.to_csv();
     let header: Vec<_> = csv.lines().next().unwrap().split(',').collect();
-    // The name has a comma, and is quoted.
+    // The name contains a comma and is quoted.
     let line = csv.lines().find(|line| line.contains(",0.01,")).unwrap();
     let rest = line.strip_prefix("\"leapfrog, by hand\",").unwrap();
     let fields: Vec<_> = rest.split(',').collect();
@@ -592,7 +596,7 @@ fn the_loosest_tolerance_that_does_not_show() {
         assert!(one.statistics.iterations <= other.statistics.iterations);
         looser += u32::from(point.tolerance > tightest);
     }
-    // Errors of 1e-3 and 1e-6 do not need an iteration to round-off; one of 1e-13 does.
+    // Errors of 1e-3 and 1e-6 do not require iterations down to rounding; one of 1e-13 does.
     assert!(looser >= 2, "{swept:?}");
     assert_eq!(swept.points().last().unwrap().tolerance, tightest);
 }

@@ -33,7 +33,7 @@ fn elements() -> [Element; 6] {
 fn the_product_is_the_derivative_of_the_run() {
     let model = Driven { c: 0.2 };
     let start = model.state([0.4, 0.9], [0.5, -0.2]);
-    // One impulse at the start, one at a node, one inside an element, one at the end; a break makes elements of two lengths.
+    // Impulses at the start, at a node, inside an element and at the end; a break leads to elements of two lengths.
     for element in elements() {
         let simulation = Simulation::new(&model)
             .element(element)
@@ -46,14 +46,15 @@ fn the_product_is_the_derivative_of_the_run() {
         let run = simulation.run_linearised(start, SPAN).expect("a run");
         assert_eq!(run.transitions().len(), run.motion().states().len() - 1);
         let error = (run.product() - difference(&simulation, start, SPAN)).amax();
-        // Truncation: δ⁴/480 times fifth derivatives, of order 10³ after twenty steps; round-off: 1e-15/δ.
+        // The truncation error is δ⁴/480 times fifth derivatives, of the order of 10³ after twenty steps; the rounding
+        // error is 1e-15/δ.
         assert!(error <= 1e-10, "{element}: {error:.1e}");
     }
 }
 
 #[test]
 fn an_impulse_inside_an_element_changes_its_matrix() {
-    // So that the test above is known to see something: by the motion, which the impulse bends.
+    // This shows that the test above has an effect to detect: the impulse changes the matrix through the motion.
     let model = Driven { c: 0.2 };
     let start = model.state([0.4, 0.9], [0.5, -0.2]);
     let simulation = Simulation::new(&model).element(Mixed::<3>).step(0.1);
@@ -110,7 +111,7 @@ fn matrices_along_a_motion_are_those_of_single_steps() {
                 let single =
                     stability::transition_matrix(&model, element, &node.state(), node.t, h)
                         .expect("a matrix");
-                // The iterations start elsewhere and stop within round-off of each other.
+                // Iterations start from different values and stop within rounding errors of each other.
                 assert_close(
                     a.as_slice(),
                     single.as_slice(),
@@ -140,7 +141,7 @@ fn multipliers_are_the_eigenvalues_of_the_product() {
     moduli.sort_by(|a, b| b.total_cmp(a));
     let found: Vec<f64> = multipliers.iter().map(Multiplier::modulus).collect();
     assert_close(&found, &moduli, 1e-12, "multipliers");
-    // An empty span moves nothing.
+    // For an empty span the matrix is the identity.
     let still = Simulation::new(&model)
         .step(0.1)
         .run_linearised(start, 1.0..1.0)
@@ -154,7 +155,8 @@ fn multipliers_are_the_eigenvalues_of_the_product() {
 fn multipliers_survive_where_the_product_does_not() {
     #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 - cos(theta))]
     struct Inverted {}
-    // Upright at rest λ = ±1: over 40 units e^±40, whose ratio is beyond the digits of a double.
+    // For the upright pendulum at rest λ = ±1. After 40 units of time the factors are e^±40, whose ratio exceeds the
+    // digits of a double.
     let model = Inverted {};
     let run = Simulation::new(&model)
         .element(Mixed::<6>)
@@ -179,7 +181,7 @@ fn multipliers_survive_where_the_product_does_not() {
 
 #[test]
 fn errors_are_those_of_a_run() {
-    // x falls from one to zero at t = 4/3, where the root ends.
+    // x falls from one to zero at t = 4/3, where the square root ends.
     #[dynamics(coordinates(x), momenta(p), hamiltonian = p^2/2 + 2*sqrt(x))]
     struct Fall {}
     let start = State { q: [1.0], p: [0.0] };

@@ -1,4 +1,4 @@
-//! The speed below which an upright top is unstable, as the elements see it: (T-87), (T-88), (T-89).
+//! The speed below which an upright top is unstable, for the discretised equations: (T-87), (T-88), (T-89).
 
 use crate::top::Top;
 use std::convert::Infallible;
@@ -13,10 +13,10 @@ const TOP: Top = Top {
     omega: 0.0,
 };
 
-/// From short steps to those over which the unstable top grows by a factor of 100.
+/// From short steps to those during which the unstable top grows by a factor of 100.
 const STEPS: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 
-/// The one speed between ½ Ω_c and 2 Ω_c at which the stability of an element changes.
+/// The only speed between ½ Ω_c and 2 Ω_c at which the stability of an element changes.
 ///
 /// The double eigenvalue there is defective and known to half of the digits only, but the root is found of a smooth function of the
 /// matrix, ∏ (μᵢ − μⱼ)² with μ = λ + 1/λ, which has a simple zero.

@@ -1,11 +1,12 @@
-//! What is recorded: models × elements × ways to solve, runs of every kind, ensembles, orbits, boundary values, families.
+//! The recorded cases: models, elements and ways to solve, runs of all kinds, ensembles, orbits, boundary-value
+//! problems, models of run-time length.
 
 use std::f64::consts::{PI, TAU};
 use tfe::ensemble::{Ends, EnsembleError};
 use tfe::prelude::*;
 use tfe::{Statistics, stability};
 
-/// The numbers that one computation gives, and what it cost.
+/// The numbers computed by one case, and its cost.
 #[derive(Default)]
 pub struct Outcome {
     pub numbers: Vec<f64>,
@@ -39,7 +40,7 @@ impl Outcome {
     }
 }
 
-/// A computation with a name.
+/// A case: a computation with a name.
 pub struct Case {
     pub name: String,
     pub run: Box<dyn Fn() -> Outcome>,
@@ -202,7 +203,7 @@ const TOP: Top = Top {
     h: 1.7,
 };
 
-/// Every element family, with few and with many nodes.
+/// All families of elements, with few and with many nodes.
 fn elements() -> Vec<Element> {
     vec![
         Element::mixed(2),
@@ -219,7 +220,7 @@ fn elements() -> Vec<Element> {
     ]
 }
 
-/// Those that hold constraints.
+/// The elements that support constraints.
 fn elements_with_constraints() -> Vec<Element> {
     vec![
         Element::mixed(3),
@@ -241,7 +242,7 @@ impl List {
         });
     }
 
-    /// Twenty steps with every element, and the transition matrix of one.
+    /// Twenty steps with each element, and the transition matrix of one step.
     fn runs<M: Model<N> + 'static, const N: usize>(
         &mut self,
         name: &str,
@@ -267,12 +268,12 @@ impl List {
     }
 }
 
-/// A motion, or what there is of it.
+/// The numbers of a motion, or of the part of it before a failure.
 fn ran<const N: usize>(run: Result<Motion<N>, tfe::RunError<N>>) -> Motion<N> {
     run.unwrap_or_else(tfe::RunError::into_partial)
 }
 
-/// The same of a family.
+/// The same for a model of run-time length.
 fn ran_family(run: Result<tfe::family::Motion, tfe::family::RunError>) -> Outcome {
     let motion = run.unwrap_or_else(tfe::family::RunError::into_partial);
     let end = motion.last();
@@ -286,7 +287,7 @@ fn ran_family(run: Result<tfe::family::Motion, tfe::family::RunError>) -> Outcom
     )
 }
 
-/// All of them.
+/// All cases.
 pub fn all() -> Vec<Case> {
     let mut list = List::default();
     models(&mut list);
@@ -333,7 +334,7 @@ fn models(list: &mut List) {
     list.runs("top", &TOP, start, 0.05, elements_with_constraints());
 }
 
-/// What a simulation can do besides.
+/// Other features of simulations.
 fn ways_to_run(list: &mut List) {
     let double = Simulation::new(&DOUBLE).element(Mixed::<4>).step(0.03);
     let start = DOUBLE.state([0.9, -0.4], [0.2, 0.5]);
@@ -570,7 +571,7 @@ fn ensembles(list: &mut List) {
     });
 }
 
-/// Orbits and boundary values.
+/// Orbits and boundary-value problems.
 fn assembled(list: &mut List) {
     list.add("orbit of a driven oscillator", || {
         let orbit = PeriodicOrbit::of(&DUFFING)

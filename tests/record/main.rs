@@ -1,10 +1,11 @@
-//! The record of results: some three hundred computations with all the numbers that they give, to the last bit.
+//! The record of results: about three hundred computations with all of their numbers, to the last bit.
 //!
-//! `cargo test --test record` compares them with `tests/reference/record.txt`, to a relative difference that roundings explain: other processors and mathematical libraries may
-//! give other last digits. Whoever rebuilds the engine wants to know of every bit:
+//! `cargo test --test record` compares them with `tests/reference/record.txt`, up to a relative difference that
+//! rounding errors explain: other processors and mathematical libraries may have different last digits. When the engine
+//! is changed, every bit matters:
 //!
 //! ```sh
-//! RECORD=bits cargo test --test record     # fails where one bit or one count differs
+//! RECORD=bits cargo test --test record     # fails if one bit or one count differs
 //! RECORD=write cargo test --test record    # writes the file anew; its change belongs to the commit that causes it, which says why
 //! ```
 
@@ -16,10 +17,10 @@ use std::fmt::Write as _;
 
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../reference/record.txt");
 
-/// What roundings of twenty steps explain, relative to the largest number of a case.
+/// The effect of rounding errors in twenty steps, relative to the largest number of a case.
 const ROUNDINGS: f64 = 1e-11;
 
-/// A line of the file: the name, the numbers in hexadecimal bits, the counts.
+/// A line of the file: the name, the bits of the numbers in hexadecimal, the counts.
 fn line(name: &str, outcome: &Outcome) -> String {
     let mut text = format!("{name} |");
     for number in &outcome.numbers {
@@ -50,7 +51,7 @@ fn read(text: &str) -> BTreeMap<String, Outcome> {
     recorded
 }
 
-/// The largest difference relative to the largest number; infinite where one is no number and the other is.
+/// The largest difference relative to the largest number; infinite if only one of the two is a number.
 fn difference(new: &[f64], old: &[f64]) -> f64 {
     if new.len() != old.len() {
         return f64::INFINITY;
@@ -89,7 +90,7 @@ fn results_are_those_on_record() {
     let text = std::fs::read_to_string(FILE).unwrap_or_default();
     let mut recorded = read(&text);
     if wanted == "write" {
-        // Those that this build does not have stay.
+        // Cases that do not exist in this build are kept.
         for (name, outcome) in outcomes {
             recorded.insert(name, outcome);
         }

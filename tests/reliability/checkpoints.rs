@@ -1,4 +1,4 @@
-//! Runs that go on from a checkpoint are those that were never cut.
+//! Runs that continue from a checkpoint equal runs without interruption.
 
 use tfe::prelude::*;
 use tfe::{RunErrorKind, Warning};
@@ -17,7 +17,7 @@ struct Damped;
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - 1e6*(x - cos(t))^2/2, force(x) = -1e3*dot(x))]
 struct Stiff;
 
-/// One run, and two of it that are cut anywhere: all states, velocities and energies are the same numbers.
+/// One run compared with two parts of it, interrupted anywhere: all states, velocities and energies have the same bits.
 #[test]
 fn two_halves_are_one_run_to_the_bit() {
     fn check<M: tfe::Model<N>, const N: usize>(
@@ -82,7 +82,7 @@ fn two_halves_are_one_run_to_the_bit() {
             50,
             &mut seed,
         );
-        // Steps that are cut into pieces, too.
+        // Also if steps are cut into pieces.
         let double = Simulation::new(&PENDULUM).element(element).step(0.15);
         check(
             &double,
@@ -107,7 +107,7 @@ fn two_halves_are_one_run_to_the_bit() {
     }
 }
 
-/// A run that goes on looks for unstable steps as one that begins.
+/// A continued run checks for unstable steps like one from the start.
 #[test]
 fn runs_that_go_on_are_watched() {
     let simulation = Simulation::new(&Oscillator).element(Primal::<3>).step(3.3);
@@ -120,7 +120,7 @@ fn runs_that_go_on_are_watched() {
     assert!(told.iter().any(is_unstable), "{told:?}");
 }
 
-/// Before the first element no impulse has acted, and then it acts once.
+/// Before the first element no impulse has acted; afterwards it has acted exactly once.
 #[test]
 fn an_impulse_where_a_run_begins_waits_for_its_first_element() {
     let run = Simulation::new(&Oscillator).step(0.1).impulse(0.0, [1.5]);
@@ -137,7 +137,7 @@ fn an_impulse_where_a_run_begins_waits_for_its_first_element() {
     assert_eq!(second.states(), &whole.states()[10..]);
 }
 
-/// The run of a model that goes on where another one has got to, beside one that begins there.
+/// A run that continues from a checkpoint of another model, compared with one that starts there.
 fn check_handing_over<M: tfe::Model<N>, const N: usize>(
     first: &Simulation<'_, M, N>,
     second: &Simulation<'_, M, N>,
@@ -154,7 +154,7 @@ fn check_handing_over<M: tfe::Model<N>, const N: usize>(
     }
 }
 
-/// The numbers of a vector are no numbered parameters.
+/// The numbers of a vector are not numbered parameters.
 #[test]
 fn other_vectors_go_on_from_a_checkpoint() {
     #[dynamics(coordinates(q[2]), lagrangian = sum(i in 0..2, m/2*dot(q[i])^2 - k[i]/2*q[i]^2))]
@@ -175,7 +175,7 @@ fn other_vectors_go_on_from_a_checkpoint() {
     check_handing_over(&run(&soft), &run(&stiff), start);
 }
 
-/// A checkpoint of a model with other parameters: nothing that belongs to these is carried on.
+/// For a checkpoint of a model with other parameters, nothing that depends on these is carried over.
 #[test]
 fn other_parameters_go_on_from_a_checkpoint() {
     #[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - k*x^2/2 - y^2/2)]
@@ -196,16 +196,16 @@ fn other_parameters_go_on_from_a_checkpoint() {
     let second = run(&stiff).resume(checkpoint, 10.0).expect("a run");
     let anew = run(&stiff).run(*checkpoint.state(), 5.0..10.0);
     let anew = anew.expect("a run");
-    // What is said of the start is so with these parameters, too: all is of one.
+    // The energy at the start is that with the new parameters, too: all values belong to one model.
     for a in 0..2 {
         let (v, right) = (second.states()[0].v[a], anew.states()[0].v[a]);
         assert!((v - right).abs() < 1e-14);
     }
     assert!((second.energies()[0] - anew.energies()[0]).abs() < 1e-14);
-    // Elements of collocation keep a quadratic energy.
+    // Elements of collocation conserve a quadratic energy.
     let change = second.energy_error();
     assert!(change < 1e-12, "{change:e}");
-    // A state that is not on the constraints of the other model is refused, as by a run.
+    // A state that violates the constraints of the other model is refused, as in a run.
     let (short, long) = (Rod { g: 9.81, l: 1.0 }, Rod { g: 9.81, l: 2.0 });
     let hanging = short.state([1.0, 0.0], [0.0, 0.0]);
     let first = Simulation::new(&short).step(0.02).run(hanging, 0.0..1.0);
@@ -218,7 +218,7 @@ fn other_parameters_go_on_from_a_checkpoint() {
         matches!(kind, RunErrorKind::Inconsistent { .. }),
         "{refused}"
     );
-    // A span that is empty does not begin a grid.
+    // An empty span does not start a new grid.
     let run = Simulation::new(&soft).step(0.1).element(Element::mixed(4));
     let whole = run.run(start, 0.0..2.0).expect("a run");
     let first = run.run(start, 0.0..1.0).expect("a run");
@@ -228,7 +228,8 @@ fn other_parameters_go_on_from_a_checkpoint() {
     assert_eq!(second.expect("a run").states(), &whole.states()[10..]);
 }
 
-/// An impulse at a checkpoint acts once, in the last element before it; where there was none it is still to act, and back in time it is taken away.
+/// An impulse at the time of a checkpoint acts once, in the last element before it. If there was no such element it is
+/// still to act, and a run backwards in time subtracts it.
 #[test]
 fn impulses_at_a_checkpoint_act_once() {
     let start = Oscillator.state([1.0], [0.2]);
@@ -247,14 +248,15 @@ fn impulses_at_a_checkpoint_act_once() {
     apart(&resumed(&first, 2.0), whole);
     let same = resumed(&first, 1.0);
     apart(&resumed(&same, 2.0), whole);
-    // Elements of collocation undo themselves.
+    // Elements of collocation are symmetric in time.
     apart(&resumed(&first, 0.0), start);
     let empty = run.run(start, 1.0..1.0).expect("nothing to do");
     let behind = run.run(start, 1.0..2.0).expect("a run").last().state();
     apart(&resumed(&empty, 2.0), behind);
 }
 
-/// Without a step of one's own that of the first half is gone on with, not the length of an element that a break has cut short.
+/// Without a step of its own, a continued run uses that of the first part, and not the length of an element that a
+/// break has shortened.
 #[test]
 fn steps_stay_where_a_break_cuts_the_first_one() {
     let run = Simulation::new(&Oscillator).break_at(1e-3);

@@ -1,4 +1,4 @@
-//! Runs where it hurts: what ends `Ok` is right, or says that it is doubtful.
+//! Difficult runs: what ends with `Ok` is right, or has a warning.
 
 mod checkpoints;
 #[path = "../common/largest.rs"]
@@ -10,7 +10,7 @@ use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};
 use tfe::{RunErrorKind, Warning};
 
-/// Two rods' ends of equal masses, lengths one.
+/// A double pendulum with equal masses and unit lengths.
 #[dynamics(
     coordinates(a, b),
     lagrangian = dot(a)^2 + dot(b)^2/2 + cos(a - b)*dot(a)*dot(b) + 2*g*cos(a) + g*cos(b)
@@ -21,7 +21,7 @@ struct DoublePendulum {
 
 const PENDULUM: DoublePendulum = DoublePendulum { g: 9.81 };
 
-/// H of the double pendulum.
+/// The Hamiltonian of the double pendulum.
 fn energy(state: &State<2>) -> f64 {
     let ([a, b], [p, r]) = (state.q, state.p);
     let c = (a - b).cos();
@@ -37,7 +37,7 @@ fn starts() -> Vec<State<2>> {
     (0..50).map(start).collect()
 }
 
-/// Six states along each of fifty motions.
+/// Six states from each of fifty motions.
 fn visited() -> Vec<State<2>> {
     let simulation = Simulation::new(&PENDULUM).element(Mixed::<6>).step(0.01);
     let mut states = Vec::new();
@@ -53,7 +53,8 @@ fn visited() -> Vec<State<2>> {
 fn a_long_step_continues_the_motion() {
     let states = visited();
     assert_eq!(states.len(), 300);
-    // (step, largest change of the energy of one of 300 steps, whose kinetic energies reach 59): before, up to 2e8 at 0.2 and 1e12 at 0.4.
+    // (step size, largest energy change in one of 300 steps, with kinetic energies up to 59). Formerly these were up to
+    // 2e8 at 0.2 and 1e12 at 0.4.
     for (h, most) in [
         (0.1, 2.0),
         (0.15, 4.0),
@@ -89,13 +90,13 @@ fn steps_that_are_cut_stay_on_the_grid() {
         assert_eq!((run.states().len(), run.statistics().steps), (21, 20));
         cuts += run.statistics().cuts;
         doubtful += usize::from(!run.warnings().is_empty());
-        // Dense output goes through all nodes, and its pieces are those of one curve.
+        // Dense output interpolates all nodes, and its pieces belong to one curve.
         for (k, node) in run.states().iter().enumerate() {
             let near = run.at((node.t + 1e-9).min(10.0)).expect("inside");
             let apart = (near.q[0] - node.q[0]).abs() + (near.q[1] - node.q[1]).abs();
             assert!(apart < 1e-6, "node {k}: {apart:.1e}");
         }
-        // The product of the matrices of the pieces is symplectic, as each of them.
+        // The product of the matrices of the pieces is symplectic, as is each of them.
         for matrix in motion.transitions() {
             let determinant = matrix.determinant();
             assert!((determinant - 1.0).abs() < 1e-6, "{determinant}");
@@ -130,8 +131,9 @@ fn ensembles_cut_the_same_steps() {
         let alone = simulation.run(*start, 0.0..2.0).expect("a run");
         let end = end.as_ref().expect("an end");
         let apart = (alone.last().q[0] - end.q[0]).abs() + (alone.last().q[1] - end.q[1]).abs();
-        // A lane begins a step that it leaves to Newton's method anew, a run continues its last element, so not the same steps are cut: they differ by the error of
-        // the step, where roots that differ were 10⁶ apart.
+        // A lane that leaves a step to Newton's method starts it anew, and a run continues from its last element, so
+        // that different steps may be cut. The difference is then the error of the step, whereas wrong roots differed
+        // by a factor of 10⁶.
         assert!(apart < 1.0, "{apart:.1e} apart");
     }
 }
@@ -147,7 +149,7 @@ struct Anharmonic {
     m: f64,
 }
 
-/// Either an error, or a warning, or the energy kept.
+/// An error, a warning, or a conserved energy.
 fn is_told<const N: usize>(run: Result<tfe::Motion<N>, tfe::RunError<N>>) -> bool {
     match run {
         Err(_) => true,
@@ -167,7 +169,8 @@ fn is_unresolved<const N: usize>(motion: &tfe::Motion<N>) -> bool {
     motion.warnings().iter().any(told)
 }
 
-/// There is no energy to compare: a driven, damped oscillator, two steps of 1 to 3 from 200 states. An end that is wrong by a fifth of the way is told.
+/// Without a conserved energy: a driven, damped oscillator, two steps of 1 to 3 from 200 states. An end whose error is
+/// a fifth of the path must have a warning.
 #[test]
 fn steps_that_do_not_resolve_a_driven_motion_are_told() {
     let (mut wrong, mut told) = (0, 0);
@@ -204,7 +207,7 @@ fn steps_that_do_not_resolve_a_driven_motion_are_told() {
     assert!(told > wrong && wrong > 5, "{wrong} wrong, {told} told");
 }
 
-/// Elements that keep the energy keep it on wrong roots as well.
+/// Energy-conserving elements conserve it at wrong roots, too.
 #[test]
 fn long_steps_that_keep_the_energy_are_told() {
     let mut wrong = 0;
@@ -225,7 +228,8 @@ fn long_steps_that_keep_the_energy_are_told() {
     assert!(wrong > 5, "{wrong} wrong");
 }
 
-/// No warning where there is nothing to warn of: also of the first order, from rest, past turning points, and in steps that take Newton's method.
+/// No unnecessary warnings: with elements of first order, from rest, past turning points, and in steps solved by
+/// Newton's method.
 #[test]
 fn steps_that_resolve_are_not_warned_of() {
     let elements = [
@@ -296,7 +300,7 @@ struct Coupled {
     c: f64,
 }
 
-/// Eigenvalues 1 − c and 1 + c.
+/// A matrix with the eigenvalues 1 − c and 1 + c.
 #[test]
 fn masses_of_both_signs_are_told() {
     let found = |c: f64| {
@@ -324,7 +328,7 @@ fn masses_of_both_signs_are_told() {
     force(x) = late*select(t < 0.5, 1, 0) + (1 - late)*select(t <= 0.5, 1, 0)
 )]
 struct Switched {
-    /// One: the force counts as after the break at the break itself; zero: as before it.
+    /// One: at the break itself the force counts as after the break; zero: as before it.
     late: f64,
 }
 
@@ -344,7 +348,7 @@ fn endless_steps_are_watched() {
             Err(error) => error.into_partial(),
         };
         let mut steps = simulation.steps(start, motion.states()[0].t);
-        // One more fails where the run has failed.
+        // One more if the run has failed.
         let count = motion.statistics().steps as usize;
         assert_eq!(
             steps.by_ref().take(count).filter(Result::is_ok).count(),
@@ -377,7 +381,7 @@ fn endless_steps_are_watched() {
     assert!(!told.is_empty());
 }
 
-/// `steps` end at breaks as runs do, on the same nodes to the bit.
+/// `steps` end at breaks as runs do, on nodes with the same bits.
 #[test]
 fn endless_steps_end_at_breaks() {
     let model = Switched { late: 0.0 };
@@ -405,7 +409,8 @@ fn endless_steps_end_at_breaks() {
     }
 }
 
-/// Force 1 before t = 0.5, none after: x(1) = 3/8, whichever side the model counts the break to, and back again.
+/// A force of 1 before t = 0.5 and none after: x(1) = 3/8, on whichever side the model counts the time of the break;
+/// and the same backwards in time.
 #[test]
 fn forces_at_breaks_are_those_of_the_element() {
     let mut met = 0;
@@ -445,7 +450,7 @@ fn forces_at_breaks_are_those_of_the_element() {
             }
         }
     }
-    // Of 120, among which there may be elements that are none.
+    // Of 120, some of which may be invalid elements.
     assert!(met > 90, "{met}");
 }
 
@@ -458,15 +463,16 @@ fn an_iteration_that_cycles_ends() {
             .max_iterations(u32::MAX)
             .tolerance(0.0)
             .step(h);
-        // It ends: with a motion, or an error.
+        // It must end, with a motion or an error.
         let _ = simulation.run(model.state([1.0], [0.3]), 0.0..10.0 * h);
     }
 }
 
-/// What an iteration leaves in an element is at most the tolerance over the largest number of the state, for each of its values: one step against one iterated to roundings.
+/// The iteration error of an element is at most the tolerance times the largest number of the state, for each of its
+/// values: one step compared with one iterated down to rounding.
 #[test]
 fn a_tolerance_is_what_an_element_leaves() {
-    /// Of one step, in numbers of the size one to three.
+    /// The error of one step, with numbers between one and three.
     const ROUNDINGS: f64 = 2e-15;
     for solve in [Solve::FixedPoint, Solve::Newton] {
         for element in [Element::mixed(3), Element::mixed(6), Element::radau(4)] {
@@ -508,11 +514,11 @@ fn steps_below_the_resolution_of_the_time_are_refused() {
         matches!(error.kind(), RunErrorKind::StepUnresolved { .. }),
         "{error}"
     );
-    // Where the time has digits enough, its origin does not matter.
+    // The origin of time does not matter as long as the time has enough digits.
     let far = simulation.run(start, 1e9..1e9 + 10.0).expect("a run");
     let near = simulation.run(start, 0.0..10.0).expect("a run");
     assert!((far.last().q[0] - near.last().q[0]).abs() < 1e-12);
-    // An end that is a rounding behind the last node is that node.
+    // An end that differs from the last node by a rounding error is that node.
     for steps in 1..40 {
         let length = f64::from(steps) * 0.01;
         let far = simulation.run(start, 1.7e9..1.7e9 + length).expect("a run");
@@ -522,8 +528,8 @@ fn steps_below_the_resolution_of_the_time_are_refused() {
     }
 }
 
-/// A bead in a bowl drives a mass by its own one, and has almost no inertia left at the bottom, which it passes in a thousandth of a second. A step that has to be cut there is looked at, whatever its
-/// number.
+/// A bead in a bowl that drives another mass and has almost no inertia left at the bottom, which it passes within a
+/// thousandth of a second. A step that has to be cut there must be checked whatever its number.
 #[test]
 fn steps_that_are_cut_are_looked_at() {
     #[dynamics(
@@ -552,7 +558,7 @@ fn steps_that_are_cut_are_looked_at() {
     );
 }
 
-/// Endless steps that are roundings of the time are refused before the first.
+/// Steps as small as rounding errors of the time are refused before the first one.
 #[test]
 fn endless_steps_below_the_resolution_of_the_time_are_refused() {
     let simulation = Simulation::new(&Oscillator).step(1.0);
@@ -566,7 +572,8 @@ fn endless_steps_below_the_resolution_of_the_time_are_refused() {
     assert!(steps.next().is_none());
 }
 
-/// Linear models of every mass, on which gravity acts: steps by one matrix are those that are solved.
+/// Linear models under gravity with masses of all sizes: steps by one matrix agree with those that are solved by
+/// iteration.
 #[test]
 fn heavy_linear_models_keep_their_motion() {
     #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y, force(y) = -m*c*dot(y))]

@@ -1,10 +1,10 @@
-//! What steppers keep of a step, and what they refuse.
+//! What steppers store for a step, and what they refuse.
 
 use super::*;
 use tfe::runtime::step::Impulse;
 
-/// What a step is does not depend on whether its inside is kept, also where steps are cut and where impulses act: states, the polynomials of all pieces and matrices are the
-/// same numbers.
+/// The result of a step does not depend on whether its inside is stored, also where steps are cut and where impulses
+/// act: states, polynomials of all pieces and matrices have the same bits.
 #[test]
 fn the_inside_of_a_step_is_of_the_root_that_was_found() {
     let mut cuts = 0;
@@ -43,7 +43,7 @@ fn the_inside_of_a_step_is_of_the_root_that_was_found() {
     assert!(cuts > 10, "{cuts} cuts");
 }
 
-/// A step that fails for want of a state says nothing of the kinks of a model.
+/// A step that fails because of an invalid state says nothing about kinks of the model.
 #[test]
 fn kinks_are_looked_for_after_a_failure() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - g*abs(x))]
@@ -71,7 +71,8 @@ fn kinks_are_looked_for_after_a_failure() {
     assert!((state.q[0] - exact).abs() < 1e-12, "{}", state.q[0]);
 }
 
-/// Gradients whose squares are no numbers: such a constraint counted as none, without a word. It holds, or the run says why it does not.
+/// Constraint gradients whose squares overflow or underflow: such a constraint was silently ignored. It must hold, or
+/// the run must say why it does not.
 #[test]
 fn constraints_of_any_size_count() {
     use tfe::runtime::constrained;
@@ -112,7 +113,7 @@ fn constraints_of_any_size_count() {
             assert!(error < 1e-14, "{s}: {found} for {expected}");
         }
         let Ok(end) = run(&model) else {
-            // Small gradients may be lost in the equations, where their squares stand beside masses.
+            // Small gradients may be lost in the equations, where their squares are added to masses.
             assert!(s < 1.0, "{s}");
             continue;
         };
@@ -123,7 +124,8 @@ fn constraints_of_any_size_count() {
     }
 }
 
-/// A start beside its constraints, whose gradients have no squares, is told; the first element took it there.
+/// An initial state that violates constraints whose gradients have no squares is reported; formerly the first element
+/// projected it.
 #[cfg(feature = "sparse")]
 #[test]
 fn starts_beside_large_constraints_are_told() {
@@ -147,7 +149,7 @@ fn starts_beside_large_constraints_are_told() {
     }
 }
 
-/// A momentum that belongs to no velocity, though constraints leave one, is no start.
+/// A momentum that belongs to no velocity is refused as an initial state, even if constraints determine one.
 #[test]
 fn momenta_without_a_velocity_are_refused() {
     #[dynamics(
@@ -158,7 +160,7 @@ fn momenta_without_a_velocity_are_refused() {
     struct Bounded;
     let stepper = Stepper::new(&Bounded, Mixed::<4>.into(), Control::default());
     let mut stepper = stepper.expect("a stepper");
-    // ∂L/∂v is less than one.
+    // |∂L/∂v| is less than one.
     let start = State {
         q: [0.0, 0.0],
         p: [0.2, 1.5],
@@ -172,7 +174,7 @@ fn momenta_without_a_velocity_are_refused() {
     assert!((state.q[0] - 0.08).abs() < 1e-12 && (state.q[1] - 0.04).abs() < 1e-12);
 }
 
-/// Derivatives by parameters that a model does not have were zeros.
+/// Derivatives by parameters that a model does not have used to be zeros.
 #[test]
 fn derivatives_by_nothing_are_refused() {
     use tfe::runtime::transition::TransitionError;

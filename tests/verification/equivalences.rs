@@ -1,4 +1,4 @@
-//! Elements that are the same map, and known schemes among them.
+//! Elements that are the same map, and known methods among them.
 
 use crate::common::assert_close;
 use crate::models::Everything;
@@ -38,12 +38,13 @@ fn mixed_and_primal_with_gauss_points_are_gauss_collocation() {
     }
 }
 
-/// Gauss collocation of (q, p)˙ = (v, L_q + Q) for the model, written out by hand: nodes by Newton on the Legendre polynomial, coefficients by
-/// integrating Lagrange polynomials, stages by fixed-point iteration. Nothing of it is shared with the library.
+/// Gauss collocation of (q, p)˙ = (v, L_q + Q), written out by hand: nodes by Newton's method on the Legendre
+/// polynomial, coefficients by integrating Lagrange polynomials, stages by fixed-point iteration. Nothing of it is
+/// shared with the library.
 fn gauss_collocation(stages: usize, y0: [f64; 4], h: f64) -> Vec<f64> {
     let nodes: Vec<f64> = (0..stages).map(|k| gauss_node(stages, k)).collect();
     let integral = |j: usize, to: f64| -> f64 {
-        // Gauss quadrature of high order is exact for the Lagrange polynomial.
+        // Gauss quadrature of high order is exact for the Lagrange polynomials.
         (0..stages + 1)
             .map(|m| {
                 let x = gauss_node(stages + 1, m);
@@ -144,7 +145,7 @@ fn primal_with_two_lobatto_points_is_stoermer_verlet() {
         }
     }
     let actual = end(&model, Primal::<2>.lobatto(), start, h, 20);
-    // Twenty steps of a few roundings each.
+    // The rounding errors of twenty steps.
     assert_close(&actual, &[q[0], q[1], p[0], p[1]], 1e-14, "Störmer–Verlet");
 }
 

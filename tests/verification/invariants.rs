@@ -1,4 +1,4 @@
-//! What elements conserve over long runs.
+//! What elements conserve in long runs.
 
 use crate::common::larger;
 use crate::models::{DoublePendulum, EulerTop, HenonHeiles, Kepler, Pendulum};
@@ -19,7 +19,7 @@ fn energy_conserving_keeps_the_double_pendulums_energy() {
             .record_every(10)
             .run(start, 0.0..100.0)
             .unwrap_or_else(|error| panic!("{element}: {error}"));
-        // 10⁴ steps; a random walk of roundings is about 100 · 1e-16.
+        // 10⁴ steps: a random walk of rounding errors reaches about 100 · 1e-16.
         assert!(
             motion.energy_error() < 1e-12,
             "{element}: {:.1e}",
@@ -28,7 +28,7 @@ fn energy_conserving_keeps_the_double_pendulums_energy() {
     }
 }
 
-/// Largest symplecticity defect along a motion.
+/// The largest symplecticity defect along a motion.
 fn defect<M: Model<N>, const N: usize>(
     model: &M,
     element: Element,
@@ -85,7 +85,8 @@ fn symplectic_elements_are_symplectic() {
 
 #[test]
 fn the_others_are_not() {
-    // So that the test above is known to see something. theory.md: −7.9e-7 for the pendulum at h = 0.5, three nodes.
+    // This shows that the test above has an effect to detect; theory.md: −7.9e-7 for the pendulum at h = 0.5 with three
+    // nodes.
     let start = State { q: [1.7], p: [0.3] };
     let a = defect(
         &Pendulum { k: 1.0 },
@@ -107,7 +108,8 @@ fn the_others_are_not() {
 
 #[test]
 fn momentum_maps_are_conserved() {
-    // Angular momentum of Kepler is quadratic: kept by Gauss collocation; p_φ and p_ψ of the top belong to cyclic coordinates: kept by every element.
+    // The angular momentum of the Kepler problem is quadratic and conserved by Gauss collocation; p_φ and p_ψ of the
+    // top belong to cyclic coordinates and are conserved by every element.
     let motion = Simulation::new(&Kepler {})
         .element(Mixed::<3>)
         .step(0.05)
@@ -151,7 +153,7 @@ fn momentum_maps_are_conserved() {
 
 #[test]
 fn no_energy_drift_of_symplectic_elements() {
-    // 10⁴ steps of 0.2 from q = 2 at rest: the error oscillates, its envelope does not grow.
+    // 10⁴ steps of 0.2 from q = 2 at rest: the error oscillates, but its envelope does not grow.
     let model = Pendulum { k: 1.0 };
     for element in [Element::mixed(2), Element::mixed(3), Element::primal(3)] {
         let motion = Simulation::new(&model)

@@ -1,4 +1,4 @@
-//! Does it do what the theory says? Orders on nonlinear scenes, invariants, equivalences.
+//! Comparison with the theory: orders on nonlinear models, invariants, equivalences.
 
 #![allow(missing_docs)] // what models and helpers mean is said where they are
 

@@ -1,4 +1,4 @@
-//! The scenes.
+//! The models of these tests.
 
 use tfe::prelude::*;
 
@@ -45,8 +45,8 @@ impl DoublePendulum {
     };
 }
 
-/// A rigid body about a fixed point as a plain Hamiltonian system in the quaternion and its momenta:
-/// the body angular momenta are πᵢ = ½ p · (e ∘ uᵢ), H = Σ πᵢ²/(2 Iᵢ) + mgd (e₀² − e₁² − e₂² + e₃²). |e| is conserved.
+/// A rigid body about a fixed point as an unconstrained Hamiltonian system in the quaternion and its momenta: the body
+/// angular momenta are πᵢ = ½ p · (e ∘ uᵢ), H = Σ πᵢ²/(2 Iᵢ) + mgd (e₀² − e₁² − e₂² + e₃²). |e| is conserved.
 #[dynamics(
     coordinates(e[4]), momenta(p[4]),
     let pi1 = (-p[0]*e[1] + p[1]*e[0] + p[2]*e[3] - p[3]*e[2])/2,
@@ -65,7 +65,7 @@ pub struct RigidBody {
 }
 
 impl RigidBody {
-    /// The state with attitude `e` and body rates `w`: p = 2 e ∘ (0, I w).
+    /// The state with the attitude `e` and body rates `w`: p = 2 e ∘ (0, I w).
     pub fn moving(&self, e: [f64; 4], w: [f64; 3]) -> State<4> {
         let [a, b, c] = [self.i1 * w[0], self.i2 * w[1], self.i3 * w[2]];
         let p = [
@@ -92,7 +92,7 @@ pub struct EulerTop {
     pub mgd: f64,
 }
 
-/// Nonlinear, time-dependent, damped: everything that an equivalence must survive.
+/// Nonlinear, time-dependent and damped, as a general case for equivalences.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (1 + x^2/4)*dot(x)^2/2 + dot(y)^2/2 + x*dot(y)*y/3 - x^4/4 - cos(y)*(1 + sin(t)/5) - x*y/3,

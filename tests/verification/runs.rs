@@ -56,7 +56,7 @@ fn dense_output_is_continuous_and_accurate() {
             for node in &motion.states()[1..motion.states().len() - 1] {
                 for side in [-1e-12, 1e-12] {
                     let near = motion.at(node.t + side).expect("inside");
-                    // |q̇| < 4 and |ṗ| < 40 over 1e-12, and roundings of sums of stages.
+                    // |q̇| < 4 and |ṗ| < 40 over 1e-12, and rounding errors of the sums of stages.
                     assert_close(
                         &near.q,
                         &node.q,
@@ -84,7 +84,7 @@ fn dense_output_is_continuous_and_accurate() {
         };
         let points: Vec<_> = [0.1, 0.05, 0.025].map(|step| (step, error(step))).into();
         let order = observed_order(&points, 1e-13, "dense output");
-        // A polynomial of degree n − 1 is right to order n between nodes (Radau and the projections one less).
+        // A polynomial of degree n − 1 has the order n between nodes (one less for Radau elements and the projections).
         assert!(
             order > element.nodes() as f64 - 1.4,
             "{element}: dense output of order {order:.2}: {points:?}"
@@ -92,7 +92,8 @@ fn dense_output_is_continuous_and_accurate() {
     }
 }
 
-/// At t = 1e9 differences of times are off by 6e-5 of a step of 0.001; velocities between nodes and integrals are not.
+/// At t = 1e9, differences of times have errors of 6e-5 relative to a step of 0.001. Velocities between nodes and
+/// integrals must not be affected.
 #[test]
 fn far_from_zero_elements_are_as_long_as_their_steps() {
     let pendulum = Pendulum { k: 1.0 };
@@ -104,7 +105,7 @@ fn far_from_zero_elements_are_as_long_as_their_steps() {
     let mut worst = 0.0;
     for pair in motion.states().windows(2) {
         let middle = pair[0].t + 0.5 * (pair[1].t - pair[0].t);
-        // The mass is one. Polynomials of q and of p are off by h⁵ and less.
+        // The mass is one. The polynomials of q and of p have errors of h⁵ and less.
         let node = motion.at(middle).expect("inside");
         worst = larger(worst, (node.v[0] - node.p[0]).abs());
     }
@@ -224,7 +225,8 @@ fn nodes_have_velocities() {
         assert_eq!(node.v, *v);
         assert_eq!(model.velocity(node.t, &node.state()), *v);
     }
-    // Between nodes the derivative of a polynomial of degree five: off by h⁵, and by no more than roundings at the points where the equations hold.
+    // Between nodes, the derivative of a polynomial of degree five has an error of h⁵; at the points where the
+    // equations hold, only a rounding error.
     for k in 1..200 {
         let between = motion.at(0.025 * f64::from(k)).expect("inside");
         let [v] = model.velocity(between.t, &between.state());
@@ -237,13 +239,15 @@ fn nodes_have_velocities() {
     assert_eq!(end.v, model.velocity(5.0, &end.state()));
 }
 
-/// A free particle and a linear force that is a sum of impulses in the limit: an impulse in the middle of an element is weighted exactly.
+/// A free particle and a linear force as the limit of a sum of impulses: an impulse in the middle of an element has the
+/// exact weight.
 #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2, output(kinetic) = m/2*dot(x)^2)]
 struct Free {
     m: f64,
 }
 
-/// Back in time an impulse is taken away again: at nodes, inside elements, on constraints and on a linear model.
+/// Backwards in time an impulse is subtracted again: at nodes, inside elements, with constraints, and for a linear
+/// model.
 #[test]
 fn impulses_back_in_time_are_undone() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + cos(x))]
@@ -274,12 +278,12 @@ fn impulses_back_in_time_are_undone() {
             }
         }
     }
-    // Symmetric elements go back on themselves.
+    // Symmetric elements return to the same state.
     check(&Pendulum, Pendulum.state([0.3], [0.7]), [1.5], 1e-12);
     check(&Linear, Linear.state([0.3], [0.7]), [1.5], 1e-12);
     let on_rod = Rod.state([0.6, -0.8], [0.8, 0.6]);
     check(&Rod, on_rod, [0.8, 0.6], 1e-11);
-    // Along the constraint it acts in full, and the first element is that from the state behind it.
+    // Along the constraint the impulse acts in full, and the first element starts from the state after it.
     let run = Simulation::new(&Rod).step(0.05);
     let kicked = run.clone().impulse(0.0, [0.8, 0.6]);
     let kicked = kicked.run(on_rod, 0.0..0.1).expect("a run");
@@ -339,8 +343,9 @@ fn impulses_change_momentum_and_are_weighted_inside_elements() {
             );
             let exact = 1.0 + 0.5 + 0.7 / 2.0 * (1.0 - time);
             let error = end.q[0] - exact;
-            // Test functions that contain the linear ones put the position exactly where the motion with the jump ends. The two-node mixed
-            // element and the elements that test with less see the impulse spread over the element: q off by at most J h / 2m.
+            // If the test functions contain the linear ones, the position is exactly where the motion with the jump
+            // ends. In the two-node mixed element, and in elements with fewer test functions, the impulse is spread
+            // over the element: q has an error of up to J h / 2m.
             let exact_weights =
                 matches!(element.family(), tfe::Family::Primal | tfe::Family::Mixed);
             let allowed = if exact_weights {
@@ -356,7 +361,8 @@ fn impulses_change_momentum_and_are_weighted_inside_elements() {
     }
 }
 
-/// Momenta jump at nodes, also where roundings are between the node and the impulse (0.3): inside elements they are those before or behind it, and integrals have the digits of the nodes.
+/// Momenta jump at nodes, also if the node and the impulse differ by a rounding error (0.3). Inside elements they are
+/// those before or after the impulse, and integrals have the accuracy of the nodes.
 #[test]
 fn momenta_jump_where_impulses_act_at_nodes() {
     let model = Free { m: 2.0 };
@@ -379,7 +385,7 @@ fn momenta_jump_where_impulses_act_at_nodes() {
                 let expected = if t < time { 1.0 } else { 1.7 };
                 assert!((p - expected).abs() < 1e-14, "{element}: {p} at {t}");
             }
-            // p²/(2m)
+            // The kinetic energy p²/(2m).
             let kinetic = motion.integral(&model, "kinetic").expect("an output");
             let exact = 0.25 * time + 1.7 * 1.7 / 4.0 * (1.0 - time);
             let found = kinetic[kinetic.len() - 1];
@@ -414,7 +420,7 @@ fn breaks_restore_the_order_across_a_jump_of_the_force() {
 
 #[test]
 fn a_run_that_fails_says_where_and_keeps_the_motion() {
-    // x falls from one, at rest, to zero at t = ∫ dx/√(4 − 4√x) = 4/3, where the root ends.
+    // x falls from one, at rest, to zero at t = ∫ dx/√(4 − 4√x) = 4/3, where the square root ends.
     #[dynamics(coordinates(x), momenta(p), hamiltonian = p^2/2 + 2*sqrt(x))]
     struct Fall {}
     let error = Simulation::new(&Fall {})
@@ -493,7 +499,7 @@ fn bad_arguments_are_errors() {
         kind(simulation().impulse(2.0, [1.0]), start, 0.0..1.0),
         Some(RunErrorKind::Impulse { .. })
     ));
-    // Also where a run has no end.
+    // Also if the run has no end.
     for (time, value) in [(f64::NAN, 1.0), (0.5, f64::INFINITY)] {
         let mut steps = simulation().impulse(time, [value]).steps(start, 0.0);
         let told = steps.next().expect("an error").expect_err("no impulse");
@@ -532,7 +538,8 @@ fn a_singular_tangent_is_an_error() {
     let result = Simulation::new(&model)
         .step(0.1)
         .run(model.state([0.0], [0.0]), 0.0..1.0);
-    // At rest in the equilibrium the motion stays there, or the tangent is found singular; never a NaN.
+    // At rest in the equilibrium, the motion stays there or the tangent is found to be singular; it must never be a
+    // NaN.
     match result {
         Ok(motion) => assert!(motion.states().iter().all(|node| node.q[0].is_finite())),
         Err(error) => assert!(

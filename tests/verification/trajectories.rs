@@ -1,17 +1,17 @@
-//! Trajectories against 32-digit references: observed orders in q and in p, and the best error.
+//! Trajectories compared with references of 32 digits: observed orders in q and in p, and the smallest errors.
 
 use crate::common::{case, distance, larger, list, number, numbers, observed_order};
 use crate::models::{DoublePendulum, EulerTop, HenonHeiles, Kepler, Pendulum, RigidBody};
 use tfe::prelude::*;
 
-/// One reference: state at a time, as (q, p).
+/// One reference: the state (q, p) at a time.
 struct Reference<const N: usize> {
     start: State<N>,
     end: State<N>,
     time: f64,
 }
 
-/// The state of the case `name` at its `index`-th time; the table lists (q…, p…).
+/// The state of the case `name` in the table at its `index`-th time; the table lists (q…, p…).
 fn phase_reference<const N: usize>(name: &str, index: usize) -> Reference<N> {
     let case = case("trajectories", name);
     let state = |values: &[f64]| State {
@@ -57,7 +57,8 @@ fn largest_errors<M: Model<N>, const N: usize>(
     off.fold([0.0; 2], larger_errors)
 }
 
-/// The observed order of the largest error at all nodes: at one time alone, an error that happens to change its sign there would show any order. Superconvergence by one power happens and is allowed above only up to 1.2.
+/// The observed order of the largest error at all nodes. At a single time, an error that happens to change its sign
+/// there could show any order. Some elements have one order more on some models, which is allowed up to 1.2.
 #[track_caller]
 fn assert_order<M: Model<N>, const N: usize>(
     model: &M,
@@ -69,13 +70,14 @@ fn assert_order<M: Model<N>, const N: usize>(
     let of_step = |&step: &f64| largest_errors(model, (element, step), exact);
     let worst: Vec<_> = steps.iter().map(of_step).collect();
     let claimed = element.order() as f64;
-    // Of five and six nodes few steps lie between the range where the error is no power yet and round-off. The elements are symmetric, their orders
-    // even: a slope within one of the claim tells it from its neighbours.
+    // With five and six nodes there are few step sizes between those where the error is not yet asymptotic and
+    // rounding. The elements are symmetric and their orders even: a slope within one of the expected order
+    // distinguishes it from its neighbours.
     let slack = if element.nodes() >= 5 { 0.95 } else { slack };
     for (which, what) in ["q", "p"].into_iter().enumerate() {
         let errors = worst.iter().map(|worst| worst[which]);
         let points: Vec<(f64, f64)> = steps.iter().copied().zip(errors).collect();
-        // Round-off is about 1e-15 for the pendulum, 1e-14 for the others.
+        // Rounding errors are about 1e-15 for the pendulum and 1e-14 for the others.
         let order = observed_order(&points, 2e-14, &format!("{element}, {what}"));
         assert!(
             order > claimed - slack && order < claimed + 1.2,
@@ -84,7 +86,8 @@ fn assert_order<M: Model<N>, const N: usize>(
     }
 }
 
-/// Steps for 2 to 6 nodes, fractions of `unit` (`six` for six nodes), in which the error falls towards round-off.
+/// Step sizes for 2 to 6 nodes, as fractions of `unit` (`six` for six nodes), for which the error falls towards
+/// rounding.
 fn steps(nodes: usize, unit: f64, six: &[f64]) -> Vec<f64> {
     let divisors: &[f64] = match nodes {
         2 => &[40.0, 80.0, 160.0, 320.0],
@@ -96,7 +99,7 @@ fn steps(nodes: usize, unit: f64, six: &[f64]) -> Vec<f64> {
     divisors.iter().map(|divisor| unit / divisor).collect()
 }
 
-/// A motion that ends at the reference: errors at many times, so that none is small by chance.
+/// A motion that ends at the reference: errors are taken at many times, so that none is small by chance.
 fn motion_to<M: Model<N>, const N: usize>(model: &M, reference: Reference<N>) -> Motion<N> {
     let how = (Mixed::<12>.into(), reference.time / 200.0);
     let motion = run(model, how, reference.start, reference.time);
@@ -154,7 +157,7 @@ fn orders_two_to_ten_on_henon_heiles() {
 #[test]
 fn orders_two_to_eight_on_the_double_pendulum() {
     let exact = motion_to(&DoublePendulum::UNIT, phase_reference("double_pendulum", 0));
-    // Chaotic: at the steps where six nodes are above round-off the error is not yet a power of the step.
+    // A chaotic motion: for the steps where six nodes have errors above rounding, the error is not yet asymptotic.
     for nodes in 2..=5 {
         for element in families(nodes) {
             assert_order(
@@ -203,7 +206,7 @@ fn radau_has_order_two_s_minus_one() {
     }
 }
 
-/// The best error over the steps given, in q and p together.
+/// The smallest error over the given steps, of q and p together.
 #[track_caller]
 fn assert_best<M: Model<N>, const N: usize>(
     model: &M,
@@ -228,7 +231,8 @@ fn assert_best<M: Model<N>, const N: usize>(
 fn best_errors() {
     let mixed = Element::mixed(8);
     for index in 0..3 {
-        // Condition: the error of q(0) and of each step's rounding grows with t: 1e-12 up to t = 20, 50.
+        // Conditioning: the error of the initial state and the rounding errors of each step grow with t; 1e-12 up to t
+        // = 20, 50.
         assert_best(
             &Kepler {},
             mixed,
@@ -260,7 +264,7 @@ fn best_errors() {
             1e-12,
         );
     }
-    // Chaotic: the flow itself amplifies one rounding by 30 to t = 3 and by 1e3 to t = 5.
+    // A chaotic motion: the exact flow amplifies a rounding error by 30 until t = 3 and by 1e3 until t = 5.
     for (index, tolerance) in [(0, 1e-13), (1, 1e-12), (2, 1e-11)] {
         assert_best(
             &DoublePendulum::UNIT,
