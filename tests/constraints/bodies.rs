@@ -1,4 +1,4 @@
-//! Bodies in space: unit quaternions, Euler angles and rotation matrices say the same.
+//! Bodies in space: unit quaternions, Euler angles and rotation matrices give the same motion.
 
 use crate::common::{assert_close, case, list, number, numbers};
 use crate::models::{QuaternionTop, axes, rate};
@@ -16,7 +16,8 @@ struct EulerTop {
     mgd: f64,
 }
 
-/// The top in the nine numbers of its rotation matrix, columns a, b, c, with the second moments d₁, d₂, d₃ of its mass:
+/// The top in the nine entries of its rotation matrix with columns a, b, c, and the second moments d₁, d₂, d₃ of its
+/// mass:
 ///
 /// ```text
 /// L = ½ Σ_k d_k |Ṙ_k|² − mgd c₃ ,   Rᵀ R = 1 ,   J₁ = d₂ + d₃, …
@@ -38,7 +39,7 @@ struct MatrixTop {
     mgd: f64,
 }
 
-/// A free body whose centre of mass is held at the distance d from the origin along its third axis.
+/// A free body whose centre of mass is kept at the distance d from the origin along its third axis.
 #[dynamics(
     coordinates(r[3], e[4]),
     let w = body_rate(e),
@@ -81,7 +82,7 @@ fn three_descriptions_of_one_top() {
     let (element, step, time) = (Mixed::<7>, 0.05, 5.0);
     let start = quaternions.tilted();
     let [a, b, c] = axes(start.q);
-    // About the third axis at 6: ȧ = 6 b, ḃ = −6 a.
+    // Rotation about the third axis at 6: ȧ = 6 b, ḃ = −6 a.
     let flat =
         |columns: [[f64; 3]; 3]| -> [f64; 9] { std::array::from_fn(|k| columns[k / 3][k % 3]) };
     let spin = flat([b.map(|b| 6.0 * b), a.map(|a| -6.0 * a), [0.0; 3]]);
@@ -164,7 +165,7 @@ fn check_trajectory(name: &str, body: &QuaternionTop, element: Element, step: f6
             .row(motion.states().len() - 1)
             .expect("outputs at the last node");
         let actual: Vec<f64> = rates.iter().copied().chain(motion.last().q).collect();
-        // Order 12; rates up to 6 over up to 400 steps.
+        // Order 12; rates up to 6 in up to 400 steps.
         assert_close(
             &actual,
             &numbers(&at["state"]),
@@ -188,7 +189,7 @@ fn trajectories_of_the_tables() {
     }
 }
 
-/// A top that spins at 150 about its second axis; inertias about the fixed point.
+/// A top that spins at 150 about its second axis; moments of inertia about the fixed point.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -234,7 +235,7 @@ fn the_fast_heavy_top() {
         150.0,
         -5.855624589205458,
     ];
-    // 48 turns: a rounding of the spin, 3e-14, is 6e-14 of angle at the end for every step it was made before.
+    // 48 turns: a rounding error of the spin, 3e-14, in one step leads to an angle of 6e-14 at the end.
     assert_close(&end[..3], &expected[..3], 1e-9, "centre of mass");
     assert_close(&end[3..], &expected[3..], 1e-8, "body rates");
     assert!(motion.constraint_residual().position < 1e-13);

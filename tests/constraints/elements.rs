@@ -1,4 +1,4 @@
-//! Which elements run constrained models, by either function, and what lies between nodes.
+//! Which elements support constrained models, as Lagrangians and Hamiltonians, and the motion between nodes.
 
 use crate::common::{distance, larger, observed_order};
 use crate::models::{KnifeEdge, RodPendulum};
@@ -7,7 +7,7 @@ use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
 use tfe::{RunErrorKind, StepError};
 
-/// The rod by a Hamiltonian.
+/// The rod as a Hamiltonian.
 #[dynamics(coordinates(x, y), momenta(px, py), hamiltonian = (px^2 + py^2)/(2*m) + m*g*y, constraint(rod) = (x^2 + y^2 - l^2)/2)]
 struct RodHamiltonian {
     m: f64,
@@ -15,7 +15,7 @@ struct RodHamiltonian {
     g: f64,
 }
 
-/// The blade by a Hamiltonian.
+/// The blade as a Hamiltonian.
 #[dynamics(
     coordinates(x, y, phi), momenta(px, py, pphi),
     hamiltonian = (px^2 + py^2)/(2*m) + pphi^2/(2*j) - m*gs*x,
@@ -61,7 +61,7 @@ fn a_hamiltonian_moves_as_its_lagrangian() {
     }
 }
 
-/// Primal elements with n − 1 Gauss points are the mixed ones, constrained or not.
+/// Primal elements with n − 1 Gauss points are the mixed ones, with and without constraints.
 #[test]
 fn reduced_primal_elements_are_mixed_ones() {
     let rod = RodPendulum::UNIT;
@@ -97,7 +97,7 @@ fn refuse<M: Model<N>, const N: usize>(
     error.kind().clone()
 }
 
-/// The error names the constraint and says what to take instead.
+/// The error names the constraint and says which element to use instead.
 #[track_caller]
 fn assert_no_place(kind: &RunErrorKind, element: Element) {
     let source = match kind {
@@ -141,7 +141,7 @@ fn elements_without_a_place_for_multipliers_are_refused() {
     }
 }
 
-/// Dense output meets the nodes, and between them the constraint holds to the accuracy of a polynomial.
+/// Dense output agrees with the nodes, and between them the constraint holds up to the accuracy of the polynomial.
 #[test]
 fn between_nodes() {
     let rod = RodPendulum::UNIT;
@@ -152,7 +152,7 @@ fn between_nodes() {
             for node in &motion.states()[1..motion.states().len() - 1] {
                 for side in [-1e-12, 1e-12] {
                     let near = motion.at(node.t + side).expect("inside");
-                    // |q̇| < 5 and |ṗ| < 30 over 1e-12, and roundings of sums of stages.
+                    // |q̇| < 5 and |ṗ| < 30 over 1e-12, and rounding errors of the sums of stages.
                     assert!(distance(&near.q, &node.q) < 3e-11, "q at {}", node.t);
                     assert!(distance(&near.p, &node.p) < 3e-10, "p at {}", node.t);
                 }

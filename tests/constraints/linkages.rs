@@ -1,5 +1,5 @@
-//! A four-bar linkage with equal cranks, through the flat position where its constraints lose rank: there the parallelogram could fold into
-//! its mirror image, and only the motion up to there says that it does not.
+//! A four-bar linkage with equal cranks that passes through the flat position, where its constraints lose rank. There
+//! the parallelogram could fold into its mirror image; only the motion before the position determines that it does not.
 
 use crate::common::{distance, larger};
 use crate::runs::run;
@@ -7,7 +7,8 @@ use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
 use tfe::{RunErrorKind, StepError};
 
-/// Two cranks of length r on the ground at distance d, a coupler of length d between their tips; angles from the ground.
+/// Two cranks of length r on the ground at distance d, and a coupler of length d between their tips; angles from the
+/// ground.
 #[dynamics(
     coordinates(left, coupler, right),
     let x = r*cos(left) + d/2*cos(coupler),
@@ -28,7 +29,7 @@ pub struct Parallelogram {
     g: f64,
 }
 
-/// As long as it stays a parallelogram it is a pendulum.
+/// As long as it remains a parallelogram, it moves as a pendulum.
 #[dynamics(
     coordinates(left),
     lagrangian = (2*j + m*r^2)/2*dot(left)^2 - (m + mc)*g*r*sin(left),
@@ -63,7 +64,7 @@ pub fn parallel(angle: f64, rate: f64) -> State<3> {
     LINKAGE.state([angle, 0.0, angle], [rate, 0.0, rate])
 }
 
-/// The largest difference to the pendulum at nodes.
+/// The largest difference from the pendulum at nodes.
 pub fn error(motion: &Motion<3>, step: f64, angle: f64, rate: f64) -> f64 {
     let end = motion.last().t;
     let exact = run(
@@ -87,7 +88,7 @@ pub fn error(motion: &Motion<3>, step: f64, angle: f64, rate: f64) -> f64 {
 
 #[test]
 fn through_the_flat_position() {
-    // Fast enough to turn over: both flat positions are passed, none of them at a node.
+    // Fast enough for full turns: both flat positions are passed, and no node lies in them.
     let (angle, rate) = (0.6, -14.0);
     for (nodes, step) in [(4, 0.002), (5, 0.005), (6, 0.005), (6, 0.0037)] {
         let motion = run(
@@ -105,7 +106,7 @@ fn through_the_flat_position() {
     }
 }
 
-/// The right motion, or an error that names a constraint and says that constraints depend on one another here.
+/// Asserts the right motion, or an error that names a constraint and says that the constraints are dependent.
 #[track_caller]
 fn right_or_refused(element: Element, step: f64, angle: f64, rate: f64) -> Option<Motion<3>> {
     let what = format!("{element}, h = {step}, from {angle:e} at {rate}");
@@ -137,7 +138,8 @@ fn right_or_refused(element: Element, step: f64, angle: f64, rate: f64) -> Optio
     }
 }
 
-/// In the flat position it is open whether the parallelogram stays one or folds: saying so is right, too.
+/// With a node in the flat position it is undetermined whether the parallelogram folds: an error that says so is right,
+/// too.
 #[test]
 fn starting_flat() {
     for (element, step) in [
@@ -154,13 +156,13 @@ fn starting_flat() {
     }
 }
 
-/// A node that happens to lie close to the flat position, where the rows are all but dependent.
+/// A node very close to the flat position, where the rows are nearly dependent.
 #[test]
 fn starting_all_but_flat() {
     for angle in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14] {
         for rate in [-9.0, 9.0] {
             let motion = right_or_refused(Element::mixed(5), 0.002, angle, rate);
-            // A thousandth of a radian is far enough for every element.
+            // A thousandth of a radian is far enough for all elements.
             assert!(angle < 1e-3 || motion.is_some(), "from {angle}");
         }
     }

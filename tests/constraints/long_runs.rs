@@ -1,4 +1,4 @@
-//! A hundred thousand steps: constraints hold, energies swing, neither drifts.
+//! A hundred thousand steps: constraints hold and energy errors oscillate, without drift.
 
 use crate::common::larger;
 use crate::models::{
@@ -9,10 +9,11 @@ use tfe::prelude::*;
 
 const STEPS: usize = 100_000;
 
-/// Round-off walks like the square root of the number of steps: 3e-14 of energies up to 10.
+/// Rounding errors grow as the square root of the number of steps: 3e-14 for energies up to 10.
 const WALK: f64 = 2e-12;
 
-/// The energy swings in the last tenth as in the first: same envelope, same mean, but for round-off up to `floor`.
+/// The energy error of the last tenth has the same envelope and mean as that of the first, except for rounding errors
+/// up to `floor`.
 #[track_caller]
 fn assert_no_drift<const N: usize>(motion: &Motion<N>, floor: f64, what: &str) {
     let energies = motion.energies();
@@ -30,7 +31,7 @@ fn assert_no_drift<const N: usize>(motion: &Motion<N>, floor: f64, what: &str) {
         swing(&energies[..tenth]),
         swing(&energies[energies.len() - tenth..]),
     );
-    // A tenth holds some hundred periods: the mean of a part of one period is left over, 1 % of the envelope.
+    // A tenth contains a hundred periods or more: the mean over an incomplete period remains, 1 % of the envelope.
     assert!(
         last.1 <= 1.02 * first.1 + floor,
         "{what}: energy error up to {:.3e} at first, {:.3e} at last",
@@ -67,7 +68,7 @@ fn check<M: Model<N>, const N: usize>(
     motion
 }
 
-/// As [`check`], and φ = 0 at every node.
+/// As [`check`], and also φ = 0 at every node.
 #[track_caller]
 fn check_positions<M: Model<N>, const N: usize>(model: &M, start: State<N>, step: f64, what: &str) {
     let motion = check(model, start, step, WALK, what);
@@ -107,7 +108,7 @@ fn the_rod_at_velocity_level() {
         WALK,
         "rod at velocity level",
     );
-    // φ is quadratic: the element keeps it, up to a walk of roundings, √1e5 · 2e-16 and some.
+    // φ is quadratic and conserved by the element, up to a random walk of rounding errors, about √1e5 · 2e-16.
     let most = motion
         .states()
         .iter()
@@ -121,7 +122,8 @@ fn the_bead_at_velocity_level() {
     let model = BeadRates { g: 9.81 };
     let start = model.state(ON_WIRE, [0.0; 2]);
     let motion = check(&model, start, 0.02, WALK, "bead at velocity level");
-    // φ is not quadratic: it is off by h⁴, but does not grow. The reference found 6.77e-8 over a tenth of the steps.
+    // φ is not quadratic: its error is of the order h⁴ but does not grow. The reference found 6.77e-8 in a tenth of the
+    // steps.
     let off = |nodes: &[Node<2>]| {
         nodes
             .iter()
@@ -140,10 +142,12 @@ fn the_bead_at_velocity_level() {
 #[test]
 fn the_knife_edge() {
     let model = KnifeEdge::TABLE;
-    // The heading grows to 2600, where a rounding is 4e-13: each turns the next step, whose work is h gs u ≤ 0.4, by so much. A walk of these,
-    // 5e-11. Without the symmetric gauge the energy would have drifted by 8e-7.
+    // The heading grows to 2600, where a rounding error is 4e-13. Each rotates the next step, whose work is h gs u ≤
+    // 0.4, by that angle; their random walk is 5e-11. Without the symmetric gauge the energy would have drifted by
+    // 8e-7.
     let motion = check(&model, model.turning(1.3), 0.02, 1e-10, "knife edge");
-    // Downhill it swings, and across it moves at a mean of gs/2w: the closed form, with the phase error of order h⁴ only.
+    // The blade oscillates downhill, and moves across the slope with a mean velocity of gs/2w: the closed form, with a
+    // phase error of order h⁴.
     let end = motion.last();
     let (w, gs, t) = (1.3, 9.81 / 2.0, end.t);
     let y = gs / (2.0 * w * w) * (w * t - (2.0 * w * t).sin() / 2.0);

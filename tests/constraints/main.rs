@@ -1,4 +1,5 @@
-//! Constrained models: against reference tables and closed forms, against minimal coordinates, over long runs, and where they start wrong.
+//! Constrained models: compared with reference tables, closed forms and minimal coordinates, in long runs, and from
+//! invalid initial states.
 
 #![allow(missing_docs)] // what models and helpers mean is said where they are
 

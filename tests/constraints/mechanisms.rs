@@ -1,11 +1,11 @@
-//! Mechanisms against minimal coordinates and against published ends.
+//! Mechanisms compared with minimal coordinates and with published results.
 
 use crate::common::{assert_close, distance};
 use crate::models::Andrews;
 use crate::runs::{last_velocities, run};
 use tfe::prelude::*;
 
-/// The car axis: two masses on springs; the left foot stands, the right one moves up and down.
+/// The car axis: two masses on springs; the left wheel stands, the right one moves up and down.
 #[dynamics(
     coordinates(xl, yl, xr, yr),
     let yb = r*sin(omega*t),
@@ -24,7 +24,8 @@ struct CarAxis {
     g: f64,
 }
 
-/// The same rod holds far above the ground as it does upon it: beside heights of 1e9 one that was too long by a tenth used to be taken.
+/// A rod far above the origin is checked like one close to it: at heights of 1e9 a rod that was too long by a tenth
+/// used to be accepted.
 #[test]
 fn a_rod_holds_at_any_height() {
     use tfe::runtime::constrained::{START_TOLERANCE, start_residuals};
@@ -55,7 +56,8 @@ fn a_rod_holds_at_any_height() {
     let text = run.expect_err("the rod is too long").to_string();
     // 1.1² − 1
     assert!(text.contains("`axis` = 2.100e-1"), "{text}");
-    // Newton's method ends where the rod holds, not where its steps are nothing beside the height: 1e-5 was left.
+    // Newton's method must end when the constraint of the rod holds, not when its steps are small relative to the
+    // height: 1e-5 was left.
     let found = model
         .consistent_state(at(1e13, 1.1), [0.0; 4])
         .expect("a rod of length one is near");
@@ -74,7 +76,8 @@ fn the_car_axis() {
     };
     let start = model.state([0.0, 0.5, 1.0, 0.5], [-0.5, 0.0, -0.5, 0.0]);
     let motion = run(&model, Mixed::<5>, 0.01, start, 3.0);
-    // The error of the element at this step is 1.1e-10 in positions and 6.9e-9 in velocities, by the table of the theory.
+    // The error of the element with this step is 1.1e-10 in positions and 6.9e-9 in velocities, by the table of the
+    // theory.
     assert_close(
         &motion.last().q,
         &[
@@ -99,12 +102,13 @@ fn the_car_axis() {
     );
     let residual = motion.constraint_residual();
     assert!(residual.position <= 1e-13, "|φ| = {:e}", residual.position);
-    // Velocities are up to 1 and rows up to 2.
+    // Velocities are up to 1, and entries of the constraint rows up to 2.
     assert!(residual.velocity <= 1e-13, "|ψ| = {:e}", residual.velocity);
     assert_eq!(residual.rank, 2);
 }
 
-/// Elements of four to eight nodes agree to 2e-12 and two halvings of the step to rounding. The test set for initial value problems publishes 16 digits, which differ from them by 1.1e-9.
+/// Elements of four to eight nodes agree to 2e-12, and two halvings of the step to rounding. The test set for initial
+/// value problems has published 16 digits, which differ from them by 1.1e-9.
 #[test]
 fn andrews_squeezer() {
     let published = [
@@ -130,7 +134,7 @@ fn andrews_squeezer() {
     }
 }
 
-/// A slider–crank as a closed loop: angles of crank and rod, place of the slider on the line y = 0.
+/// A slider–crank as a closed loop: the angles of crank and rod, and the position of the slider on the line y = 0.
 #[dynamics(
     coordinates(crank, rod, slider),
     let x = r*cos(crank) + l/2*cos(rod),
@@ -152,7 +156,7 @@ struct SliderCrank {
     c: f64,
 }
 
-/// The same in the angle of the crank alone.
+/// The same with the angle of the crank only.
 #[dynamics(
     coordinates(crank),
     let rod = -asin(r/l*sin(crank)),
@@ -220,7 +224,7 @@ fn the_slider_crank() {
             minimal.outputs().row(k).expect("recorded"),
         );
         let expected = [crank.q[0], outputs[0], outputs[1]];
-        // Both of order 12 with 60 steps to a turn.
+        // Both have order 12 and 60 steps per turn.
         assert_close(&node.q, &expected, 1e-10, &format!("t = {}", node.t));
         let rates = [minimal.velocities()[k][0], outputs[2]];
         assert_close(&[v[0], v[2]], &rates, 1e-8, &format!("t = {}", node.t));
@@ -245,7 +249,7 @@ struct ChainAngles {
     g: f64,
 }
 
-/// The same in places, with a family of rods.
+/// The same in Cartesian coordinates, with a constraint for each rod.
 #[dynamics(
     coordinates(x[5], y[5]),
     lagrangian = sum(i in 0..5, m/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
@@ -286,7 +290,7 @@ fn five_links_in_angles_and_in_places() {
     );
     for k in 0..in_angles.states().len() {
         let (q, v) = spread(&in_angles.states()[k].q, &in_angles.velocities()[k]);
-        // Order 12 at 0.02; the fastest mode has a period of 0.4.
+        // Order 12 with steps of 0.02; the fastest mode has a period of 0.4.
         let what = format!("t = {}", in_angles.states()[k].t);
         assert_close(&in_places.states()[k].q, &q, 1e-10, &what);
         assert!(

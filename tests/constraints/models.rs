@@ -1,8 +1,9 @@
-//! The scenes that several files use.
+//! The models that several files use.
 
 use tfe::prelude::*;
 
-/// A point mass on a massless rod, y upwards. Half of the square: the reaction is λ (x, y).
+/// A point mass on a massless rod, y upwards. The constraint is half of the difference of squares, so that the reaction
+/// is λ (x, y).
 #[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y, constraint(rod) = (x^2 + y^2 - l^2)/2)]
 pub struct RodPendulum {
     pub m: f64,
@@ -10,7 +11,7 @@ pub struct RodPendulum {
     pub g: f64,
 }
 
-/// The same, the constraint given at velocity level.
+/// The same with the constraint on velocities.
 #[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y, constraint(rod) = dot((x^2 + y^2)/2))]
 pub struct RodPendulumRates {
     pub m: f64,
@@ -44,16 +45,16 @@ pub struct Bead {
     pub g: f64,
 }
 
-/// The same, the constraint given at velocity level.
+/// The same with the constraint on velocities.
 #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(wire) = dot(y - x^4/4))]
 pub struct BeadRates {
     pub g: f64,
 }
 
-/// x = 1.2 on the wire.
+/// The position x = 1.2 on the wire.
 pub const ON_WIRE: [f64; 2] = [1.2, 0.5184];
 
-/// A bead on a wire that moves, with a force that depends on the velocity and has no potential.
+/// A bead on a moving wire, with a velocity-dependent force without potential.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
@@ -66,8 +67,9 @@ pub struct MovingWire {
     pub c: f64,
 }
 
-/// A unit quaternion, scalar first, body to space, that carries a body with inertias i1, i2, i3 about a fixed point and the weight mg at
-/// the distance d on the third axis. Off |e| = 1 the Lagrangian continues as the table's does.
+/// A unit quaternion, scalar first, from body to space, for a body with moments of inertia i1, i2, i3 about a fixed
+/// point and the weight mg at the distance d on the third axis. For |e| ≠ 1 the Lagrangian is continued as in the
+/// table.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -99,7 +101,7 @@ impl QuaternionTop {
         self.state(e, rate(e, w))
     }
 
-    /// Tilted by ½ about the first axis, 6 about the third axis of the body.
+    /// Tilted by ½ about the first axis, spinning at 6 about the third axis of the body.
     pub fn tilted(&self) -> State<4> {
         self.moving([0.25_f64.cos(), 0.25_f64.sin(), 0.0, 0.0], [0.0, 0.0, 6.0])
     }
@@ -138,7 +140,7 @@ pub fn axes([a, b, c, d]: [f64; 4]) -> [[f64; 3]; 3] {
     ]
 }
 
-/// A blade on an incline: it slides along its heading φ, not across. x points downhill.
+/// A blade on an incline: it can slide along its heading φ, not across. x points downhill.
 #[dynamics(
     coordinates(x, y, phi),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(phi)^2 + m*g*sin(alpha)*x,
@@ -160,13 +162,13 @@ impl KnifeEdge {
         alpha: std::f64::consts::FRAC_PI_6,
     };
 
-    /// From rest at the origin, turning at `rate`.
+    /// At the origin without speed, turning at `rate`.
     pub fn turning(&self, rate: f64) -> State<3> {
         self.state([0.0; 3], [0.0, 0.0, rate])
     }
 }
 
-/// A blade on ground that moves: A and a depend on the time.
+/// A blade on moving ground: A and a depend on time.
 #[dynamics(
     coordinates(x, y, phi),
     lagrangian = (dot(x)^2 + dot(y)^2 + dot(phi)^2)/2 + 2*x - cos(phi)*y/3,

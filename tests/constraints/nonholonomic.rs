@@ -1,4 +1,4 @@
-//! Rolling and sliding: closed forms, and what the same equations without the correction force would do.
+//! Rolling and sliding: closed forms, and the different motion from the equations without the correction force.
 
 use crate::common::{assert_close, distance, larger};
 use crate::models::KnifeEdge;
@@ -18,7 +18,7 @@ fn the_knife_edge() {
                 scale * (w * t - (2.0 * w * t).sin() / 2.0),
                 w * t,
             ];
-            // Places up to 60.
+            // Coordinates up to 60.
             assert_close(&node.q, &expected, 1e-11, &format!("w = {w}, t = {t}"));
         }
         assert!(motion.constraint_residual().velocity < 1e-13);
@@ -47,7 +47,7 @@ fn the_chaplygin_sleigh() {
     let c = 1.1;
     let k2 = (model.j + model.m * model.a * model.a) / model.m;
     let k = k2.sqrt();
-    // From τ = −2, where it still slides backwards, through its turn to where it runs straight ahead.
+    // From τ = −2, where it still slides backwards, through its turn until it slides straight ahead.
     let (start_time, rate) = (-2.0_f64, model.a * c / k2);
     let exact = |tau: f64| {
         let (v, w) = (c * tau.tanh(), c / k / tau.cosh());
@@ -71,7 +71,7 @@ fn the_chaplygin_sleigh() {
         ];
         assert_close(&actual, &expected, 1e-10, &format!("t = {}", node.t));
     }
-    // ½ m c² at every node; order 10 leaves 1e-12.
+    // The energy is ½ m c² at every node; order 10 has an error of 1e-12.
     let energy = 0.5 * model.m * c * c;
     assert!(
         motion.energies().iter().all(|e| (e - energy).abs() < 1e-11),
@@ -95,8 +95,8 @@ struct Coin {
     gs: f64,
 }
 
-/// What comes out of varying L + μ Ψ without the correction force: the Hamiltonian of a problem of control, the extreme over all velocities
-/// that roll, u along the heading,
+/// The equations from varying L + μ Ψ without the correction force: the Hamiltonian of an optimal control problem, the
+/// extremum over all velocities that roll, with u along the heading,
 ///
 /// ```text
 /// H = ½ (p_x cos φ + p_y sin φ + p_ψ/r)² / (m + J_a/r²) + p_φ²/2J_d − m gs x ,   p = L_v + Aᵀμ
@@ -136,7 +136,8 @@ fn the_rolling_coin_and_its_vakonomic_double() {
     for node in motion.states() {
         assert_close(&node.q, &closed(node.t), 1e-11, &format!("t = {}", node.t));
     }
-    // The same Lagrangian, start and velocities; μ at the start is free. Whatever it is, the motion is another.
+    // The same Lagrangian, initial position and velocities; the initial μ is arbitrary. For all of its values the
+    // motion is a different one.
     let double = VakonomicCoin { m, r, jd, ja, gs };
     let mut nearest = f64::INFINITY;
     for i in -8..=8 {

@@ -1,4 +1,4 @@
-//! Orders 2(n − 1) in q and in p, with position constraints and with velocity constraints.
+//! Orders 2(n − 1) in q and in p, with constraints on positions and on velocities.
 
 use crate::common::{distance, larger, observed_order};
 use crate::models::{
@@ -7,7 +7,7 @@ use crate::models::{
 };
 use tfe::prelude::*;
 
-/// The states at t = ½, 1, 1½, 2 of a run with `divisor` steps to each half.
+/// The states at t = ½, 1, 1½, 2 of a run with `divisor` steps in each half unit.
 fn quarters<M: Model<N>, const N: usize>(
     model: &M,
     element: Element,
@@ -24,10 +24,10 @@ fn quarters<M: Model<N>, const N: usize>(
     motion.states()[1..].to_vec()
 }
 
-/// How fast a scene is: steps to each half of a time unit between the range where the error is no power yet and round-off, for 2 to 5 nodes.
+/// The range of steps per half time unit in which the error is asymptotic and above rounding, for 2 to 5 nodes.
 type Divisors = [[usize; 4]; 4];
 
-/// The rod and the bead, which fall: their errors are large.
+/// For the rod and the bead, which fall: their errors are large.
 const FAST: Divisors = [
     [80, 160, 320, 640],
     [20, 40, 80, 160],
@@ -35,7 +35,7 @@ const FAST: Divisors = [
     [12, 14, 17, 20],
 ];
 
-/// The others: finer steps meet round-off.
+/// For the others, since their errors reach rounding with larger steps.
 const SLOW: Divisors = [
     [80, 160, 320, 640],
     [20, 40, 80, 160],
@@ -43,7 +43,8 @@ const SLOW: Divisors = [
     [5, 6, 7, 8],
 ];
 
-/// The largest errors at four times fall with 2(n − 1): at one time alone an error that happens to change its sign shows any order.
+/// The largest error at four times falls with order 2(n − 1). At a single time, an error that happens to change its
+/// sign could show any order.
 #[track_caller]
 pub fn assert_orders<M: Model<N>, const N: usize>(
     model: &M,
@@ -70,7 +71,7 @@ pub fn assert_orders<M: Model<N>, const N: usize>(
             curves[1].push((h, worst(|node| &node.p)));
         }
         for (what, points) in ["q", "p"].iter().zip(curves) {
-            // Values are about 1, momenta up to 6; a few hundred roundings.
+            // Values are about 1, momenta up to 6: a few hundred rounding errors.
             let order = observed_order(&points, 1e-13, &format!("{element}, {what}"));
             assert!(
                 (order - claimed).abs() <= 0.35,

@@ -1,10 +1,10 @@
-//! Mechanisms that move although they have as many equations as coordinates, or more.
+//! Mechanisms that move although they have as many constraints as coordinates, or more.
 
 use crate::common::{distance, larger};
 use tfe::prelude::*;
 use tfe::runtime::length::{Declared, FixedLength};
 
-/// A door on three hinges: each holds a point, the lowest one the direction as well. 12 equations, rank 6.
+/// A door on three hinges: each fixes a point, the lowest one the direction as well. 12 equations of rank 6.
 #[dynamics(
     coordinates(r[3], e[4]),
     let w = body_rate(e),
@@ -25,7 +25,7 @@ struct Door {
     slope: f64,
 }
 
-/// Declares a plate on parallel bars of length one. (Rows that are multiples of others are refused where they are declared.)
+/// Declares a plate on parallel bars of length one. (Rows that are multiples of others are refused at the declaration.)
 macro_rules! plate {
     ($name:ident, $($bar:ident = $row:expr),+) => {
         #[dynamics(
@@ -63,7 +63,9 @@ plate!(
     two = (x2 - l) ^ 2 + y2 ^ 2 - 1,
     three = 1e-6 * ((x3 - 2 * l) ^ 2 + y3 ^ 2 - 1)
 );
-/// Bricard's orthogonal linkage, a closed chain of six revolutes: six tetrahedra, each hinged to the next along an edge, by the ends a, b of the hinges. The first one stands. 24 equations for
+/// Bricard's orthogonal linkage, a closed chain of six revolute joints: six tetrahedra, each hinged to the next along
+/// an edge, described by the ends a, b of the hinges. The first one is fixed. 24 equations of rank 23 for 24
+/// coordinates.
 /// 24 coordinates, rank 23.
 #[dynamics(
     coordinates(a3[3], b3[3], a4[3], b4[3], a5[3], b5[3], a6[3], b6[3]),
@@ -102,8 +104,9 @@ fn minus(a: Vector, b: Vector) -> Vector {
 }
 
 impl Bricard {
-    /// The position of threefold symmetry whose odd hinges are `radius` from its axis. Hinges lie in planes through the axis, centres of odd and even ones at ±z; neighbours are at right
-    /// angles, and their common normals have length one: r₁ r₂ = 2/3, 4 z² = 5/3 − r₁² − r₂².
+    /// The position with threefold symmetry in which the odd hinges are at the distance `radius` from the axis. Hinges
+    /// lie in planes through the axis, the centres of odd and even ones at ±z. Neighbours are perpendicular, and their
+    /// common normals have length one: r₁ r₂ = 2/3, 4 z² = 5/3 − r₁² − r₂².
     fn at(&self, radius: f64) -> [f64; 24] {
         let (r1, r2) = (radius, 2.0 / (3.0 * radius));
         let z = 0.5 * (5.0 / 3.0 - r1 * r1 - r2 * r2).sqrt();
@@ -158,13 +161,13 @@ where
     start.state
 }
 
-/// Steps of runs for the energy: `LONG_STEPS=10000` takes as many.
+/// The number of steps of runs for the energy; `LONG_STEPS=10000` makes as many.
 pub fn long_steps() -> u32 {
     let asked = std::env::var("LONG_STEPS").ok();
     asked.and_then(|text| text.parse().ok()).unwrap_or(200)
 }
 
-/// The largest change of the energy in a step, and since the start.
+/// The largest change of the energy in one step, and since the start.
 pub fn energies_off<const N: usize>(motion: &Motion<N>) -> (f64, f64) {
     let energies = motion.energies();
     let jumps = energies.windows(2).map(|pair| (pair[1] - pair[0]).abs());
@@ -178,7 +181,7 @@ pub fn energies_off<const N: usize>(motion: &Motion<N>) -> (f64, f64) {
     (jump, drift)
 }
 
-/// Errors at the end fall with the order of the element, and energies over many steps do not drift.
+/// Errors at the end fall with the order of the element, and energies do not drift over many steps.
 fn keeps_its_order<M, const N: usize>(model: &M, start: State<N>, (h, rank): (f64, usize))
 where
     M: Model<N> + Declared<N, Length = FixedLength>,
@@ -242,7 +245,7 @@ pub fn plate() -> (Plate, State<3>) {
     (plate, start)
 }
 
-/// However the rows are given: the same motion.
+/// The motion does not depend on how the constraints are written.
 #[test]
 fn a_plate_on_three_bars() {
     let (plate, start) = plate();

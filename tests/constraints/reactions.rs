@@ -1,10 +1,10 @@
-//! Multipliers at nodes: the force of each constraint.
+//! Multipliers at nodes: the reaction force of each constraint.
 
 use crate::models::{KnifeEdge, RodPendulum, RodPendulumRates};
 use crate::runs::run;
 use tfe::prelude::*;
 
-/// λ (x, y) is the pull of the rod: λ l = m g y/l − m v²/l.
+/// λ (x, y) is the force of the rod: λ l = m g y/l − m v²/l.
 #[track_caller]
 fn check_rod(motion: &Motion<2>, model: &RodPendulum, tolerance: f64) {
     let reactions = motion.reactions();
@@ -42,7 +42,8 @@ fn the_pull_of_the_rod() {
         Element::primal(3),
         Element::primal(4).lobatto(),
     ] {
-        // A function of the state at the node: right to round-off whatever the error of the state is. λ is up to 20.
+        // λ is a function of the state at the node, and is therefore right up to rounding whatever the error of the
+        // state. It is up to 20.
         check_rod(&run(&model, element, 0.02, start, 3.0), &model, 1e-12);
     }
 }
@@ -54,14 +55,14 @@ fn the_pull_is_the_same_at_velocity_level() {
     check_rod(&motion, &RodPendulum::UNIT, 1e-11);
 }
 
-/// Against the closed form of the pull over the angle: λ = 3 m g y from horizontal rest, l = 1.
+/// The closed form of the reaction as a function of the position: λ = 3 m g y from horizontal rest, l = 1.
 #[test]
 fn the_pull_over_the_angle() {
     let model = RodPendulum::UNIT;
     let motion = run(&model, Mixed::<6>, 0.01, model.horizontal(), 2.0);
     let pull = motion.reactions().column("rod").expect("declared");
     for (node, pull) in motion.states().iter().zip(pull) {
-        // The energy is right to 1e-12, and v² with it.
+        // The energy, and with it v², has an error of 1e-12.
         assert!(
             (pull - 3.0 * model.g * node.q[1]).abs() < 1e-11,
             "t = {}: λ = {pull}",
@@ -70,7 +71,8 @@ fn the_pull_over_the_angle() {
     }
 }
 
-/// Across the blade act centripetal force and weight: λ (sin φ, −cos φ) with λ = −m u φ̇ − m gs sin φ, u the speed along it.
+/// Across the blade, the reaction balances centripetal force and weight: λ (sin φ, −cos φ) with λ = −m u φ̇ − m gs sin
+/// φ, where u is the speed along it.
 #[test]
 fn the_side_force_of_the_blade() {
     let model = KnifeEdge::TABLE;

@@ -1,4 +1,4 @@
-//! Constraints of which some follow from others: the rank is said, the motion is the same.
+//! Redundant constraints, of which some follow from others: the rank is reported, and the motion is the same.
 
 use crate::common::distance;
 use crate::models::RodPendulum;
@@ -6,7 +6,7 @@ use crate::runs::{differences, run};
 use std::ops::RangeInclusive;
 use tfe::prelude::*;
 
-/// The rod said twice, once by its square and once by its length.
+/// The rod declared twice, by the square of its length and by its length.
 #[dynamics(
     coordinates(x, y),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
@@ -19,7 +19,7 @@ struct TwiceHeld {
     g: f64,
 }
 
-/// A blade held by its constraint and by a multiple of it that depends on the heading.
+/// A blade with its constraint and a multiple of it that depends on the heading.
 #[dynamics(
     coordinates(x, y, phi),
     lagrangian = (dot(x)^2 + dot(y)^2 + dot(phi)^2)/2 + gs*x,
@@ -30,7 +30,7 @@ struct TwoBlades {
     gs: f64,
 }
 
-/// Two cranks, r and 2r long, on one slider.
+/// Two cranks of lengths r and 2r on one slider.
 #[dynamics(
     coordinates(x, a, b),
     lagrangian = m/2*dot(x)^2 + m*r^2/2*(dot(a)^2 + dot(b)^2),
@@ -42,7 +42,8 @@ struct Cranks {
     r: f64,
 }
 
-/// Lengths of 1e-11 m beside angles: both rows are (1, 0, 0) but for that, and one was left out in silence, so that the second crank went on by itself.
+/// Lengths of 1e-11 m next to angles: both rows are nearly (1, 0, 0). One was silently left out as redundant, so that
+/// the second crank moved freely.
 #[test]
 fn short_cranks_are_two_conditions() {
     let ends = [1.0, 1e-11].map(|r| {
@@ -60,7 +61,7 @@ fn short_cranks_are_two_conditions() {
         }
         motion.last().q
     });
-    // The unit of length makes no difference but for roundings, 200 steps of them.
+    // The unit of length makes no difference except for the rounding errors of 200 steps.
     for k in 1..3 {
         let off = ends[1][k] - ends[0][k];
         assert!(off.abs() < 1e-9, "{off:e}");
@@ -87,12 +88,14 @@ fn two_equations_for_one_rod() {
         assert_eq!(b.constraint_residual().rank, 1);
         assert!(b.constraint_residual().position < 1e-12);
         if nodes >= 4 {
-            // The two equations differ off the circle, within elements: the discrete motions agree to the accuracy of both.
+            // The two equations differ off the circle, within elements: the discrete motions agree up to the accuracy
+            // of both.
             let (q, p) = differences(&a, &b);
             let error = if nodes == 4 { 1e-7 } else { 1e-10 };
             assert!(q < error && p < 5.0 * error, "{nodes}: {q:e}, {p:e}");
         }
-        // A sum of the shares, each times the length of its row (both 1 at l = 1), is the pull; of least norm: equal shares.
+        // The sum of the multipliers, each times the length of its row (both 1 at l = 1), is the reaction; that of
+        // least norm has equal parts.
         let (rod, first, second) = (
             a.reactions().column("rod").expect("declared"),
             b.reactions().column("rod").expect("declared"),
@@ -123,8 +126,9 @@ fn two_equations_for_one_blade() {
     assert!(distance(&end.q, &expected) < 1e-10, "{end:?}");
 }
 
-/// A four-bar linkage of three bodies in space: unit quaternions, ball joints at four points, and at each of them two conditions more that make
-/// it a hinge across the plane. 23 equations for 21 coordinates and one degree of freedom: three follow from the others.
+/// A spatial four-bar linkage of three bodies: unit quaternions, ball joints at four points, and two further conditions
+/// at each of them that make it a hinge perpendicular to the plane. 23 equations for 21 coordinates and one degree of
+/// freedom: three of them are redundant.
 #[dynamics(
     coordinates(r1[3], e1[4], r2[3], e2[4], r3[3], e3[4]),
     let w1 = body_rate(e1),
@@ -189,7 +193,7 @@ struct PlanarFourBar {
 
 #[test]
 fn a_four_bar_linkage_in_space() {
-    // Crank up at (0, ½), coupler from there to (1, 0.9), rocker from (1.2, 0).
+    // The crank stands up at (0, ½), the coupler goes from there to (1, 0.9), the rocker from (1.2, 0).
     let (l1, l2, l3, ground) = (0.5, 1.0_f64.hypot(0.4), 0.2_f64.hypot(0.9), 1.2);
     let (m1, m2, m3, g) = (0.5, 1.0, 0.8, 9.81);
     let planar = PlanarFourBar {
@@ -217,12 +221,13 @@ fn a_four_bar_linkage_in_space() {
         0.4_f64.atan2(1.0),
         0.9_f64.atan2(-0.2),
     ];
-    // The tip of the coupler moves with both: w₂ = −0.2 w₃ and −½ w₁ − 0.4 w₂ = −0.9 w₃.
+    // The end of the coupler moves with coupler and rocker: w₂ = −0.2 w₃ and −½ w₁ − 0.4 w₂ = −0.9 w₃.
     let w1 = 4.0;
     let w3 = 0.5 * w1 / 0.98;
     let rates = [w1, -0.2 * w3, w3];
     let middles = [[0.0, 0.25], [0.5, 0.7], [1.1, 0.45]];
-    // The middle of a rod on the ground moves about its foot; the coupler's about the tip of the crank.
+    // The centres of crank and rocker move about their pivots on the ground; that of the coupler about the tip of the
+    // crank.
     let speeds = [
         [-0.25 * w1, 0.0],
         [-0.5 * w1 - 0.2 * rates[1], 0.5 * rates[1]],
@@ -246,7 +251,7 @@ fn a_four_bar_linkage_in_space() {
     for (k, (a, b)) in motion.states().iter().zip(flat.states()).enumerate() {
         for body in 0..3 {
             let (half, at) = (b.q[body] / 2.0, 7 * body);
-            // Order 8 at 0.01.
+            // Order 8 with steps of 0.01.
             assert!(
                 (a.q[at + 3] - half.cos()).abs() < 1e-9
                     && (a.q[at + 6] - half.sin()).abs() < 1e-9
@@ -260,11 +265,11 @@ fn a_four_bar_linkage_in_space() {
         assert!(reactions.iter().all(|r| r.is_finite()));
     }
     assert!(motion.reactions().row(usize::MAX).is_none());
-    // It moved: the crank fell by more than a radian.
+    // The mechanism has moved: the crank fell by more than a radian.
     assert!((flat.last().q[0] - angles[0]).abs() > 1.0);
 }
 
-/// A bead on the unit circle, x = cos θ and y = sin θ, with a fly wheel: the angle alone.
+/// A bead on the unit circle, x = cos θ and y = sin θ, with a flywheel: as a model in the angle.
 #[dynamics(coordinates(th), lagrangian = (1 + j)/2*dot(th)^2 - g*sin(th))]
 struct Angle {
     j: f64,
@@ -320,7 +325,7 @@ circle!(
     c = x ^ 2 + y ^ 2 - 1 + x - cos(th)
 );
 
-/// The angle at t = 10, or why there is none.
+/// The angle at t = 10, or the error.
 macro_rules! angle_of {
     ($name:ident, $element:expr, $h:expr) => {{
         let model = $name { j: 0.1, g: 9.81 };
@@ -333,7 +338,9 @@ macro_rules! angle_of {
     }};
 }
 
-/// Which rows are given makes no difference. Rank two at all positions, but every two of the three rows are dependent somewhere, two of the pairs within the motion. Before, with the row of the circle first: six
+/// The choice of the rows used makes no difference. The rank is two in all positions, but every two of the three rows
+/// are dependent somewhere, two of the pairs within the motion. Formerly, with the row of the circle first, six nodes
+/// and h = 0.05 had an error of 2e-4, three nodes and h = 0.0037 one of 4e-2.
 /// nodes and h = 0.05 off by 2e-4, three nodes and h = 0.0037 by 4e-2.
 #[track_caller]
 fn a_third_row_is_as_good_as_two(nodes: RangeInclusive<usize>) {
@@ -342,9 +349,9 @@ fn a_third_row_is_as_good_as_two(nodes: RangeInclusive<usize>) {
     let fine = Simulation::new(&angle).element(Mixed::<8>).step(0.002);
     let exact = fine.run(start, 0.0..10.0).expect("a run").last().q[0];
     for nodes in nodes {
-        // Where the error is a step's own, not the next term of its series.
+        // Step sizes at which the error is asymptotic.
         let steps = [0.1, 0.07, 0.05, 0.03, 0.02, 0.01, 0.0037];
-        // Shorter ones of many nodes are off by roundings, whatever the rows.
+        // With shorter ones and many nodes, errors are rounding errors, whatever rows are used.
         let count = if nodes < 6 { 7 } else { 6 };
         for h in steps.into_iter().take(count).skip(usize::from(nodes < 4)) {
             let element = Element::mixed(nodes);
@@ -361,7 +368,7 @@ fn a_third_row_is_as_good_as_two(nodes: RangeInclusive<usize>) {
                 ("doubled", angle_of!(Doubled, element, h)),
                 ("summed", angle_of!(Summed, element, h)),
             ] {
-                // The rounding of 10⁴ iterations.
+                // The rounding errors of 10⁴ iterations.
                 let difference = (angle(other) - three).abs();
                 assert!(
                     difference < 1e-12,
@@ -372,7 +379,7 @@ fn a_third_row_is_as_good_as_two(nodes: RangeInclusive<usize>) {
     }
 }
 
-// Parts of one test, so that they run side by side.
+// Parts of one test, so that they run in parallel.
 #[test]
 fn a_third_row_is_as_good_as_two_with_few_nodes() {
     a_third_row_is_as_good_as_two(3..=5);

@@ -1,4 +1,4 @@
-//! Every row of the table: single steps, and states along motions known to 12 digits and more.
+//! All rows of the table of references: single steps, and states along motions that are known to 12 digits and more.
 
 use crate::common::{assert_close, count, list, number, numbers, reference, word};
 use crate::models::{
@@ -20,7 +20,7 @@ fn one_step<M: Model<N>, const N: usize>(
     (end.q.to_vec(), end.p.to_vec())
 }
 
-/// All rows of a list of single steps; `step` gives q and p by the name of the system.
+/// Checks all rows of a list of single steps; `step` returns q and p for the name of the system.
 fn check_steps(rows: &str, step: impl Fn(&str, &Value) -> (Vec<f64>, Vec<f64>)) {
     let table = reference("constraints");
     let mut compared = 0;
@@ -32,7 +32,7 @@ fn check_steps(rows: &str, step: impl Fn(&str, &Value) -> (Vec<f64>, Vec<f64>)) 
             number(&row["h"])
         );
         let (q, p) = step(system, row);
-        // Momenta of the top are up to 6: 1e-13 is a few roundings of the last Newton correction.
+        // Momenta of the top are up to 6: 1e-13 is a few rounding errors of the last Newton correction.
         assert_close(&q, &numbers(&row["q1"]), 1e-13, &format!("{what}: q"));
         assert_close(&p, &numbers(&row["p1"]), 1e-13, &format!("{what}: p"));
         compared += 1;
@@ -108,7 +108,8 @@ fn states_along_motions() {
             "knife_edge" => vec![end(&KnifeEdge::TABLE, KnifeEdge::TABLE.turning(1.3), time)],
             other => panic!("no system is called {other}"),
         };
-        // The bead's own reference has 12 digits; order 10 at h = 0.02 leaves less than that for the others.
+        // The reference of the bead has 12 digits; for the others, order 10 with h = 0.02 has a smaller error than
+        // that.
         let tolerance = if system == "bead_on_quartic" {
             2e-11
         } else {

@@ -1,4 +1,4 @@
-//! Runs that must not fail, and their errors.
+//! Helpers: runs that must not fail, and their errors.
 
 use crate::common::{distance, larger};
 use tfe::prelude::*;
@@ -28,7 +28,7 @@ pub fn last_velocities<const N: usize>(motion: &Motion<N>) -> [f64; N] {
         .expect("a motion has its start at least")
 }
 
-/// The largest difference of coordinates and of momenta at nodes of equal number.
+/// The largest difference of coordinates and of momenta over corresponding nodes.
 pub fn differences<const N: usize>(one: &Motion<N>, other: &Motion<N>) -> (f64, f64) {
     assert_eq!(one.states().len(), other.states().len());
     one.states()

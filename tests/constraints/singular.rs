@@ -1,15 +1,16 @@
-//! Positions that the motion passes smoothly although constraints lose rank there, at nodes and beside them; and a linkage with redundant constraints all along.
+//! Singular positions, in which constraints lose rank but which the motion passes smoothly, at nodes and close to them;
+//! and a linkage whose constraints are redundant throughout.
 
 use crate::linkages::{LINKAGE, ONE_ANGLE, error, parallel};
 use crate::overconstrained::{energies_off, long_steps};
 use tfe::prelude::*;
 
-/// Distances in time between a node and a singular position.
+/// Differences in time between a node and a singular position.
 const BESIDE: [f64; 12] = [
     0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3,
 ];
 
-/// Where a coordinate of a run passes zero.
+/// The time at which a coordinate of a run passes zero.
 fn root(motion: &Motion<1>) -> f64 {
     let of = |t: f64| motion.at(t).expect("within").q[0];
     let (mut early, mut late) = (0.0, motion.last().t);
@@ -25,13 +26,13 @@ fn root(motion: &Motion<1>) -> f64 {
     0.5 * (early + late)
 }
 
-/// Steps such that node `node` lies beside a time.
+/// Steps such that node `node` lies close to a given time.
 fn steps(when: f64, node: f64) -> impl Iterator<Item = f64> {
     let sides = BESIDE.into_iter().flat_map(|beside| [-beside, beside]);
     sides.map(move |beside| (when + beside) / node)
 }
 
-/// Rows that vanish: the angles of a parallelogram.
+/// Rows that vanish: a parallelogram in angles.
 #[test]
 fn nodes_in_the_flat_position() {
     let (angle, rate) = (0.6, -14.0);
@@ -53,7 +54,7 @@ fn nodes_in_the_flat_position() {
     }
 }
 
-/// A chain of two four-bar linkages of equal bars, in natural coordinates (the benchmark of singular positions).
+/// A chain of two four-bar linkages with equal bars, in natural coordinates (a benchmark for singular positions).
 #[dynamics(
     coordinates(x[3], y[3]),
     lagrangian = sum(i in 0..3, dot(x[i])^2 + dot(y[i])^2)/6
@@ -69,7 +70,7 @@ struct Windows {
     g: f64,
 }
 
-/// As long as the bars stay parallel.
+/// The motion as long as the bars stay parallel.
 #[dynamics(coordinates(a), lagrangian = (1/2 + 1)*dot(a)^2 - g*(3/2 + 2)*sin(a))]
 struct Parallel {
     g: f64,
@@ -89,7 +90,7 @@ fn nodes_where_all_bars_are_in_line() {
         .run(one.state([angle], [rate]), 0.0..1.5)
         .expect("a pendulum");
     let when = root(&exact);
-    // Of the order 2(n − 1), as between other nodes.
+    // The order is 2(n − 1), as at other nodes.
     for (nodes, most) in [(3, 2e-6), (4, 3e-10), (6, 2e-12)] {
         for step in steps(when, 50.0) {
             let what = format!("{nodes} nodes, h = {step:e}");
@@ -113,7 +114,7 @@ fn nodes_where_all_bars_are_in_line() {
     }
 }
 
-/// A node that was stepped over is no obstacle to going on from a checkpoint.
+/// A node that was stepped over does not prevent continuing from a checkpoint.
 #[test]
 fn checkpoints_at_singular_nodes() {
     let (angle, rate) = (0.6, -14.0);
@@ -215,7 +216,7 @@ impl Bennett {
             );
         }
         let mut v = [0.0; 21];
-        // Spin of the first body; the rest follows.
+        // The spin of the first body; the others follow from it.
         let w = [0.0, 0.0, 0.0, 0.5 * rate];
         let spin = times(w, [q[3], q[4], q[5], q[6]]);
         v[3..7].copy_from_slice(&spin);
@@ -229,7 +230,7 @@ impl Bennett {
     }
 }
 
-/// 27 equations of which 20 are independent, for 21 coordinates.
+/// 27 equations, of which 20 are independent, for 21 coordinates.
 #[test]
 fn bennett() {
     let alpha = 0.6_f64;

@@ -1,4 +1,5 @@
-//! Steps down to the resolution of positions: an iteration that has reached the roundings of its constraints is done.
+//! Steps down to the resolution of positions: an iteration that has reached the rounding errors of its constraints must
+//! end. Also steps that are far too long.
 
 use crate::common::{distance, larger};
 use crate::models::{
@@ -39,7 +40,8 @@ struct SliderCrank {
 
 const STEPS: [f64; 9] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
-/// Runs with three to eight nodes; before, eight nodes stalled below 1e-5 and took more than a hundred iterations a step where they did not.
+/// Runs with three to eight nodes. Formerly eight nodes failed below steps of 1e-5, or took more than a hundred
+/// iterations per step.
 fn runs<M, const N: usize>(model: &M, start: State<N>)
 where
     M: tfe::runtime::Model<N>
@@ -55,7 +57,7 @@ where
             assert!(iterations <= 16 * 40, "{nodes} {step:e}: {iterations}");
             let energies = motion.energies();
             let off = energies[40] - energies[0];
-            // Of order 2(n − 1) where it is not rounding.
+            // The error is of order 2(n − 1) unless it is rounding.
             let most = 1e-13 + (2.0 * step).powi(2 * nodes as i32 - 2);
             assert!(
                 off.abs() < most,
@@ -96,7 +98,8 @@ fn a_slider_crank_takes_steps_of_any_size() {
     runs(&crank, start);
 }
 
-/// Elements of three to seven nodes against eight: errors fall with the order 2(n − 1) of the element until they are roundings, and stay there.
+/// Elements of three to seven nodes compared with eight: errors fall with the order 2(n − 1) of the element until they
+/// reach rounding, and then remain there.
 fn falls<M, const N: usize>(name: &str, model: &M, start: State<N>, largest: f64)
 where
     M: tfe::runtime::Model<N>
@@ -133,7 +136,7 @@ where
     }
 }
 
-/// What is to be shown of each of the mechanisms, with a span in which it moves.
+/// What is tested for each of the mechanisms, with a span in which it moves.
 trait Shown {
     fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
     where
@@ -189,14 +192,15 @@ fn errors_fall_until_they_are_roundings() {
     each(&Falls);
 }
 
-/// Steps that are far too long: a run that is near the motion, or says that it may not be, or an error where a mechanism turns by more than half a radian within the shortest piece
-/// that a step is cut into.
+/// Steps that are far too long: the run is close to the motion, or warns that it may not be, or ends with an error if
+/// the mechanism rotates by more than half a radian within the shortest piece into which a step is cut.
 fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
-    /// Steps of each run; of Andrews' squeezer, which turns a thousand times in a second, one.
+    /// The number of steps in each run; one for Andrews' squeezer, which rotates a thousand times per second.
     const COUNT: u32 = 4;
-    /// Over the largest coordinate: what an element of few nodes may be off where a step is a third of a period. Roots of other motions are off by the size of the mechanism.
+    /// Relative to the largest coordinate: the error that an element with few nodes may have with a step of a third of
+    /// a period. Wrong roots differ by the size of the mechanism.
     const NEAR: f64 = 0.2;
-    /// Of a step.
+    /// Relative to the step size.
     const SHORTEST_PIECE: f64 = 1.0 / 1024.0;
     struct Long {
         nodes: RangeInclusive<usize>,
@@ -220,7 +224,7 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
             };
             let fine = simulation.clone().element(Mixed::<5>).step(short);
             let exact = fine.run(start, 0.0..known).expect("a run");
-            // How far it turns within a time, at most, as far as the motion is known.
+            // The largest rotation within a time, as far as the motion is known.
             let turns = |within: f64, step: f64| {
                 let nodes = exact.states().iter().filter(|node| node.t <= step);
                 let pairs = nodes.clone().zip(nodes.skip(1));
@@ -228,7 +232,7 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
                 within * speeds.fold(0.0, larger)
             };
             let steps = [1.0, 0.7, 0.5, 0.3, 0.2, 0.1].into_iter();
-            // Those of the squeezer are cut into a thousand pieces each: two, with two elements.
+            // Steps of the squeezer are cut into a thousand pieces each: use only two of them, with two elements.
             for step in steps.filter(|step| !is_fast || [1.0, 0.1].contains(step)) {
                 let nodes = self.nodes.clone();
                 for nodes in nodes.step_by(if is_fast { 2 } else { 1 }) {
@@ -288,7 +292,7 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
     );
 }
 
-// Parts of one test, so that they run side by side.
+// Parts of one test, so that they run in parallel.
 #[test]
 fn long_steps_of_few_nodes_run_or_are_too_long() {
     long_steps_run_or_are_too_long(3..=5);
@@ -304,19 +308,20 @@ fn long_steps_of_many_nodes_run_or_are_too_long() {
     long_steps_run_or_are_too_long(8..=8);
 }
 
-/// What all runs of an accuracy take, beside a run with the fewest equal steps of the same element from which on the accuracy is met: kernels evaluated. Three times at most on six
-/// mechanisms; a little more on others, where a pair of runs had to be given up shortly before its end.
+/// The cost of all runs for an accuracy, in evaluations of kernels, compared with a run with the fewest equal steps of
+/// the same element that meets the accuracy from there on. It is at most three times that on six mechanisms, and a
+/// little more on others, where a pair of runs had to be abandoned shortly before its end.
 #[test]
 fn accuracies_take_a_few_times_the_best_by_hand() {
-    /// A few steps are enough there, which no search knows.
+    /// Only a few steps are enough there, which a search cannot know.
     const SHORT: [&str; 2] = ["top", "blade"];
     const THRICE: [&str; 6] = ["rod", "bead", "moving wire", "ground", "plate", "fast rod"];
-    /// Where a run that was nearly good enough is made again.
+    /// A run that was nearly accurate enough is repeated.
     const MOST: f64 = 4.0;
     struct Work {
-        /// Estimates within a factor of two, and all.
+        /// The number of estimates within a factor of two, and of all.
         sharp: Cell<(u32, u32)>,
-        /// Runs with at most three times the least work.
+        /// The number of runs with at most three times the least work.
         good: Cell<u32>,
     }
     impl Shown for Work {
@@ -328,7 +333,7 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
             let simulation: Simulation<'_, M, N> = Simulation::new(model);
             let fine = simulation.clone().element(Mixed::<8>).step(span / 400.0);
             let exact = fine.run(start, 0.0..span).expect("a run");
-            // At all nodes, over the largest number of its kind.
+            // The error at all nodes, relative to the largest coordinate or momentum.
             let off = |motion: &Motion<N>| {
                 let largest = |part: fn(&tfe::Node<N>) -> [f64; N]| {
                     let size = |numbers: [f64; N]| {
@@ -375,7 +380,7 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
                     let motion = run.run(start, 0.0..span);
                     motion.ok().filter(|motion| off(motion) < accuracy)
                 };
-                // Not by chance.
+                // Three successive numbers of steps must meet it: not only by chance.
                 let meets = |count: u64| (count..count + 3).all(|count| made(count).is_some());
                 let (mut too_few, mut enough) = (0, 1);
                 while !meets(enough) {
@@ -415,7 +420,8 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
     assert!(10 * sharp >= 9 * all, "{sharp} of {all}");
 }
 
-/// An iteration that starts from what another one has found for the same step ends after two increments, at the same state; of another number of nodes, sooner than by itself.
+/// An iteration that starts from the result of another one for the same step ends after two increments, at the same
+/// state; from the result of another number of nodes, it ends sooner than by itself.
 #[test]
 fn what_one_element_has_found_serves_another() {
     struct Serves;
@@ -428,7 +434,7 @@ fn what_one_element_has_found_serves_another() {
             let h = span / 60.0;
             let stepper = |nodes: usize| {
                 let element = tfe::Element::mixed(nodes);
-                // Roundings take iterations of their own.
+                // Rounding errors may take a few more iterations.
                 let control = Control {
                     tolerance: 1e-11,
                     ..Control::default()

@@ -1,18 +1,18 @@
-//! Stability of constrained motions from one step's transition matrix.
+//! Stability of constrained motions, from the transition matrix of one step.
 
 use crate::models::{QuaternionTop, RodPendulum};
 use crate::runs::run;
 use nalgebra::DMatrix;
 use tfe::prelude::*;
 
-/// Small swings: frequency² ω².
+/// A linear oscillator with frequency² ω².
 #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - omega2*x^2)/2)]
 struct Oscillator {
     omega2: f64,
 }
 
-/// Hanging at rest, the rod with three nodes and more is the oscillator with the element's own matrix; with two nodes the pull acts in two
-/// impulses at the ends, ½ h m g each, and the swing is leapfrog's: trace 2 − h² g/l.
+/// Hanging at rest, the rod has the same element matrix as the oscillator for three nodes and more. With two nodes, the
+/// reaction acts as two impulses at the ends, ½ h m g each, and the swing is that of leapfrog: trace 2 − h² g/l.
 #[test]
 fn the_hanging_rod() {
     let rod = RodPendulum {
@@ -48,7 +48,8 @@ fn the_hanging_rod() {
     }
 }
 
-/// An equilibrium is known to roundings, behind which coordinates and velocities have any sign: the basis at the end does not turn with them.
+/// An equilibrium is known up to rounding errors, so that coordinates and velocities may have any sign: the basis at
+/// the end must not change with these signs.
 #[test]
 fn a_little_beside_the_equilibrium() {
     let rod = RodPendulum {
@@ -68,7 +69,7 @@ fn a_little_beside_the_equilibrium() {
                 .unwrap_or_else(|error| panic!("x = {x}, h = {h}: {error}"));
             let oscillator = stability::transition_matrix(&swing, element, &zero, 0.0, h);
             let expected = oscillator.expect("an oscillator").trace();
-            // The matrix changes with x, by some 1e-12.
+            // The matrix changes by some 1e-12 with x.
             assert!(
                 (a.trace() - expected).abs() < 1e-10,
                 "x = {x}, h = {h}: trace {}, expected {expected}",
@@ -83,7 +84,7 @@ fn a_little_beside_the_equilibrium() {
     }
 }
 
-/// An empty span is the identity on the two motions that the rod allows, without an element.
+/// An empty span gives the identity on the two motions that the rod allows.
 #[test]
 fn nothing_moves_in_an_empty_span() {
     let rod = RodPendulum {
@@ -101,7 +102,8 @@ fn nothing_moves_in_an_empty_span() {
     assert_eq!(still.on_constraints().map(<[_]>::len), Some(0));
 }
 
-/// The steps at which an element fails are those of the oscillator: zeros of directions that are no motions do not count.
+/// The steps at which an element becomes unstable are those of the oscillator: zero eigenvalues of directions that are
+/// no motions do not count.
 #[test]
 fn unstable_steps_of_the_hanging_rod() {
     let rod = RodPendulum {
@@ -119,7 +121,7 @@ fn unstable_steps_of_the_hanging_rod() {
     assert!((primal[0].end - 12.0_f64.sqrt()).abs() < 1e-10);
     assert!((primal[1].start - 60.0_f64.sqrt()).abs() < 1e-10);
     assert!(gaps(Mixed::<3>.into()).is_empty());
-    // With two nodes the pull acts in impulses: leapfrog's limit.
+    // With two nodes the reaction acts as impulses: the limit of leapfrog.
     let two = gaps(Mixed::<2>.into());
     assert!(
         two.len() == 1 && (two[0].start - 2.0).abs() < 1e-10,
@@ -127,7 +129,8 @@ fn unstable_steps_of_the_hanging_rod() {
     );
 }
 
-/// A thin disk of radius r that rolls on a plane: contact point, heading, lean, roll. The contact runs along the heading at r dψ/dt.
+/// A thin disk of radius r that rolls on a plane: contact point, heading, lean, roll angle. The contact point moves
+/// along the heading at r dψ/dt.
 #[dynamics(
     coordinates(x, y, phi, theta, psi),
     let cx = x - r*sin(theta)*sin(phi),
@@ -145,7 +148,8 @@ struct Disk {
 }
 
 impl Disk {
-    /// One step of straight rolling at the speed with this square, on the tangent space of the constraints.
+    /// The transition matrix of one step of straight rolling, at the speed with this square, on the tangent space of
+    /// the constraints.
     fn rolling(&self, speed2: f64, element: Element, h: f64) -> DMatrix<f64> {
         let v = speed2.sqrt();
         let start = self.state([0.0; 5], [v, 0.0, 0.0, 0.0, v / self.r]);
@@ -156,7 +160,7 @@ impl Disk {
     }
 }
 
-/// The root of a function that changes its sign between two places.
+/// The root of a function that changes its sign between two arguments.
 fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let sign = f(low).signum();
     assert!(f(high).signum() != sign, "no change of sign");
@@ -171,11 +175,13 @@ fn bisect(mut low: f64, mut high: f64, f: impl Fn(f64) -> f64) -> f64 {
     f64::midpoint(low, high)
 }
 
-/// Thin and uniform: straight rolling is stable for v² > g r/3.
+/// A thin uniform disk: straight rolling is stable for v² > g r/3.
 ///
-/// Of the eight multipliers six are 1: four shifts (place, heading, roll), and the neighbouring rolls, straight and in circles. The two of the
-/// lean, μ and 1/μ, are real where it falls: the trace is 6 + μ + 1/μ, and passes through 8 at the limit. The six ones belong to long Jordan
-/// chains (a change of the speed of turning moves y with t²), so the radius itself is known to a few digits only; the trace is smooth.
+/// Of the eight multipliers, six are 1: those of four shifts (position, heading, roll), and of the neighbouring
+/// motions, rolling straight and in circles. The two of the lean, μ and 1/μ, are real if the disk falls: the trace is
+/// 6 + μ + 1/μ, and passes through 8 at the limit. The six ones belong to long Jordan chains (a change of the yaw rate
+/// moves y with t²), so that the spectral radius itself is accurate to a few digits only; the trace is a smooth
+/// function.
 #[test]
 fn the_rolling_disk() {
     let disk = Disk {
@@ -199,7 +205,8 @@ fn the_rolling_disk() {
         );
         let radius =
             |factor: f64| stability::spectral_radius(&disk.rolling(factor * limit, element, h));
-        // 10 % below it grows by about h √(0.1 g/r); above, what is left of 1 is the scatter of the defective ones, ε^(1/4).
+        // 10 % below the limit, the growth is about h √(0.1 g/r); above, the deviation from 1 is the scatter of the
+        // defective eigenvalues, ε^(1/4).
         assert!(
             radius(0.9) > 1.0 + h,
             "{element}: radius {} below the limit",
@@ -213,7 +220,7 @@ fn the_rolling_disk() {
     }
 }
 
-/// The mass has no part in how it rolls, neither where momenta are small beside coordinates nor where they are large.
+/// The mass has no effect on rolling, neither if momenta are small compared with coordinates nor if they are large.
 #[test]
 fn disks_of_any_mass_roll_alike() {
     let trace = |m: f64| {
@@ -223,12 +230,12 @@ fn disks_of_any_mass_roll_alike() {
     let expected = trace(1.0);
     for m in [1e-12, 1e-6, 1e3] {
         let error = (trace(m) - expected).abs();
-        // Roundings of an element and of two bases.
+        // The rounding errors of an element and of two bases.
         assert!(error < 1e-8, "m = {m}: {error:e}");
     }
 }
 
-/// The matrix of e → e ∘ g.
+/// The matrix of the map e → e ∘ g.
 fn followed_by([a, b, c, d]: [f64; 4]) -> DMatrix<f64> {
     DMatrix::from_row_slice(
         4,
@@ -242,8 +249,8 @@ fn followed_by([a, b, c, d]: [f64; 4]) -> DMatrix<f64> {
     )
 }
 
-/// One step of the top that sleeps upright at the spin with this square, seen from the body: the turn g of the step is a symmetry of the model
-/// (p and q turn alike), and undone after it.
+/// The transition matrix of one step of the sleeping top at the spin with this square, seen from the body: the rotation
+/// g during the step is a symmetry of the model (p and q rotate alike), and is undone after it.
 fn sleeping(spin2: f64, element: Element, h: f64) -> DMatrix<f64> {
     let top = QuaternionTop::TABLE;
     let start = top.moving([1.0, 0.0, 0.0, 0.0], [0.0, 0.0, spin2.sqrt()]);
@@ -257,13 +264,13 @@ fn sleeping(spin2: f64, element: Element, h: f64) -> DMatrix<f64> {
     undo * a
 }
 
-/// ω² = 4 J₁ mgd / J₃² = 16, found on the nonlinear model in quaternions.
+/// The limit of stability ω² = 4 J₁ mgd / J₃² = 16, found from the nonlinear model in quaternions.
 #[test]
 fn the_sleeping_top() {
     let limit = 16.0;
     for (element, h) in [(Element::mixed(5), 0.05), (Element::primal(5), 0.05)] {
-        // Below the limit it grows by h √(mgd/J₁ (1 − ω²/16)); pairs of equal multipliers scatter by √ε = 1.5e-8. At 1e-6 growth the
-        // spin is 4e-10 from the limit.
+        // Below the limit, the growth is h √(mgd/J₁ (1 − ω²/16)); pairs of equal multipliers scatter by √ε = 1.5e-8. At
+        // a growth of 1e-6 the spin is 4e-10 from the limit.
         let found = bisect(0.8 * limit, 1.25 * limit, |spin2| {
             stability::spectral_radius(&sleeping(spin2, element, h)) - (1.0 + 1e-6)
         });

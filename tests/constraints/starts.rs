@@ -1,4 +1,4 @@
-//! Where a motion may start: errors that name the constraint, and projections.
+//! Valid and invalid initial states: errors that name the constraint, and projections.
 
 use crate::models::{BeadRates, KnifeEdge, MovingWire, QuaternionTop, RodPendulum};
 use tfe::RunErrorKind;
@@ -49,7 +49,7 @@ fn starts_off_the_constraints_are_refused_by_name() {
     let blade = KnifeEdge::TABLE;
     let text = inconsistent(&blade, blade.state([0.0; 3], [1.0, 0.5, 0.0]));
     assert_says(&text, "blade", 0.5);
-    // At velocity level any place is right, and only speeds can be wrong.
+    // With a constraint on velocities all positions are valid, and only velocities can be wrong.
     let bead = BeadRates { g: 9.81 };
     let off = bead.state([1.0, 3.0], [1.0, 1.0]);
     assert!(Simulation::new(&bead).step(0.01).run(off, 0.0..0.1).is_ok());
@@ -73,8 +73,8 @@ fn round_off_is_not_a_violation() {
     }
 }
 
-/// A run may be continued from any of its states. The quaternion's kinetic energy is singular across the sphere: what rounding leaves of the pivot
-/// there must not be taken for a mass.
+/// A run may be continued from any of its states. The kinetic energy of the quaternion is singular in the direction
+/// across the sphere: the rounding error of the pivot there must not be taken for a mass.
 #[test]
 fn states_of_a_motion_are_starts() {
     let top = QuaternionTop::TABLE;
@@ -106,7 +106,7 @@ fn projections_go_the_shortest_way() {
     assert!((found.position - (length - 1.3).abs()).abs() < 1e-12);
     assert!((found.velocity - across.abs()).abs() < 1e-12);
     assert_eq!(found.rank, 1);
-    // What is right stays.
+    // What is valid remains unchanged.
     let v = found.state.p.map(|p| p / 0.7);
     let again = rod.consistent_state(found.state.q, v).expect("it is");
     assert!(again.position < 1e-15 && again.velocity < 1e-15);
@@ -136,7 +136,7 @@ fn projections_at_a_time_and_of_rates() {
     assert!(found.position > 0.0 && found.position < 0.5);
     let run = Simulation::new(&wire).step(0.01).run(found.state, t..2.0);
     assert!(run.is_ok(), "{:?}", run.err());
-    // A velocity constraint moves no place.
+    // A constraint on velocities does not change positions.
     let blade = KnifeEdge::TABLE;
     let found = blade
         .consistent_state([1.0, 2.0, 0.0], [3.0, 0.5, 0.2])
@@ -146,7 +146,7 @@ fn projections_at_a_time_and_of_rates() {
     assert!((found.state.p[0] - 3.0).abs() < 1e-14 && found.state.p[1].abs() < 1e-14);
 }
 
-/// On the unit circle and at x = 2: nowhere.
+/// On the unit circle and at x = 2: no solution.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2,
@@ -191,6 +191,6 @@ fn starts_that_are_no_numbers() {
         matches!(error.kind(), RunErrorKind::Start { .. }),
         "{error}"
     );
-    // The middle of the circle: every direction is as near as any other.
+    // At the centre of the circle, all directions are equally near.
     assert!(rod.consistent_state([0.0, 0.0], [0.0; 2]).is_err());
 }

@@ -1,4 +1,5 @@
-//! Areas on the manifold of states: kept with position constraints, not with velocity constraints.
+//! Symplectic areas on the manifold of states: conserved with constraints on positions, not with constraints on
+//! velocities.
 
 use crate::models::{Bead, BeadRates, ON_WIRE, RodPendulum};
 use crate::runs::run;
@@ -11,12 +12,12 @@ fn area(u: &DVector<f64>, w: &DVector<f64>) -> f64 {
     (0..n).map(|i| u[n + i] * w[i] - w[n + i] * u[i]).sum()
 }
 
-/// By how much a matrix changes the area of two tangent vectors.
+/// The relative change by a matrix of the area of two tangent vectors.
 fn defect(a: &DMatrix<f64>, u: &DVector<f64>, w: &DVector<f64>) -> f64 {
     area(&(a * u), &(a * w)) / area(u, w) - 1.0
 }
 
-/// The tangent vectors on the wire at x with dx/dt = v: along x with v as it is, and along v.
+/// The tangent vectors for a bead on the wire at x with dx/dt = v: along x with fixed v, and along v.
 fn on_wire(x: f64, v: f64) -> [DVector<f64>; 2] {
     [
         DVector::from_column_slice(&[0.0, 3.0 * x * x * v, 1.0, x.powi(3)]),
@@ -55,8 +56,8 @@ fn position_constraints_keep_areas() {
     }
 }
 
-/// The bead at velocity level, in x and its own momentum π = p_x + x³ p_y (the end is a little off the wire): the defects that the theory
-/// measured at x = 0.9, π = (1 + x⁶) dx/dt = 1.1, h = 0.1.
+/// The bead with a constraint on velocities, in x and its own momentum π = p_x + x³ p_y (the end is slightly off the
+/// wire): the defects given in the theory at x = 0.9, π = (1 + x⁶) dx/dt = 1.1, h = 0.1.
 #[test]
 fn velocity_constraints_do_not() {
     let bead = BeadRates { g: 9.81 };
@@ -85,7 +86,7 @@ fn velocity_constraints_do_not() {
     }
 }
 
-/// φ(q) of the wire is a function of the state alone: the start is on it again after a step back.
+/// φ(q) of the wire is a function of the state only: after a step back the state is the initial one again, on the wire.
 #[test]
 fn a_step_back_returns() {
     let bead = BeadRates { g: 9.81 };
@@ -102,7 +103,7 @@ fn a_step_back_returns() {
             .expect("and back");
         let end = back.last();
         for i in 0..2 {
-            // Ten steps there and back; the motion amplifies nothing by more than 10.
+            // Ten steps forwards and back; the motion amplifies nothing by more than 10.
             assert!((end.q[i] - start.q[i]).abs() < 1e-12, "{nodes}: {end:?}");
             assert!((end.p[i] - start.p[i]).abs() < 1e-11, "{nodes}: {end:?}");
         }

@@ -1,4 +1,4 @@
-//! Loose tolerances and accuracies: what iterations leave is small beside it, and constraints hold.
+//! Loose tolerances and accuracies: iteration errors are small compared with them, and constraints hold.
 
 use crate::common::larger;
 use tfe::prelude::*;
@@ -55,7 +55,7 @@ struct Pulled {
     g: f64,
 }
 
-/// What is to be shown of every scene.
+/// What is tested for every model.
 trait Shown {
     fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>)
     where
@@ -101,7 +101,8 @@ fn off<const N: usize>(motion: &Motion<N>, exact: &Motion<N>) -> f64 {
     off / scale
 }
 
-/// The same as accuracies are meant: coordinates over the largest coordinate of the motion, momenta over the largest momentum.
+/// The same in the sense of accuracies: coordinates relative to the largest coordinate of the motion, momenta relative
+/// to the largest momentum.
 fn off_by_kind<const N: usize>(motion: &Motion<N>, exact: &Motion<N>) -> f64 {
     let of = |part: fn(&tfe::Node<N>) -> &[f64; N]| {
         let (a, b) = (part(motion.last()), part(exact.last()));
@@ -124,7 +125,7 @@ where
     run.run(start, 0.0..END).expect("a run")
 }
 
-/// Loose tolerances used to end in "the constraints are dependent", which was false.
+/// Loose tolerances used to end with the error "the constraints are dependent", which was false.
 #[test]
 fn loose_tolerances_are_no_contradictions() {
     struct Tolerances;
@@ -173,12 +174,12 @@ fn accuracies_are_met_with_constraints() {
                 let off = off_by_kind(&motion, &exact);
                 assert!(off < accuracy, "{what}: {off:e}");
                 let estimate = motion.error_estimate();
-                // What the reference is known to.
+                // The accuracy of the reference.
                 assert!(
                     off < 2.0 * estimate + 1e-14,
                     "{what}: {off:e}, {estimate:e}"
                 );
-                // Thousands of steps were taken for 1e-2, since longer ones ended in errors.
+                // Thousands of steps were taken for 1e-2, since longer ones ended with errors.
                 let steps = motion.statistics().steps;
                 assert!(steps < 500, "{what}: {steps}");
             }

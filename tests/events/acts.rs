@@ -1,4 +1,4 @@
-//! What is done at events, in all kinds of runs; and what is misused.
+//! The acts of events in all kinds of runs, and their misuse.
 
 use super::*;
 use crate::largest::larger;
@@ -15,7 +15,7 @@ fn a_run_that_records_has_the_same_bits() {
         .run(start, 0.0..20.0)
         .expect("a run");
     assert_eq!(plain.states(), watched.states());
-    // Four maxima, three ways up.
+    // Four maxima, and three upward crossings.
     assert_eq!(watched.events().len(), 7);
     let in_order = watched
         .events()
@@ -40,7 +40,7 @@ fn a_run_stops_at_an_event() {
     assert!((motion.at(1.5).expect("inside").q[0] - 1.5_f64.cos()).abs() < 1e-8);
 }
 
-/// A kick that turns the velocity round at x = 0 makes |cos t|; energies stay.
+/// An impulse that reverses the velocity at x = 0 turns the motion into |cos t|; the energy does not change.
 #[test]
 fn impulses_act_at_events() {
     let model = Oscillator { level: 0.0 };
@@ -62,7 +62,7 @@ fn impulses_act_at_events() {
         );
     }
     assert!((motion.last().q[0] - 30.0_f64.cos().abs()).abs() < 1e-10);
-    // ∫₀³⁰ |cos t| dt: twenty quarters, from 19/2 π on the sine again.
+    // ∫₀³⁰ |cos t| dt: twenty quarter periods up to 19/2 π, and the rest of a sine.
     let covered = motion.integral(&model, "place").expect("an integral");
     let expected = 19.0 + (1.0 + 30.0_f64.sin());
     assert!(
@@ -84,7 +84,7 @@ fn misuse_is_told() {
         error.to_string(),
         "there is no event or output `heihgt`: the model declares height, rate"
     );
-    // A state that is none.
+    // An invalid state.
     let error = Simulation::new(&BALL)
         .step(0.1)
         .on("height", Crossing::Falling, |_| {
@@ -99,7 +99,8 @@ fn misuse_is_told() {
     assert!(error.partial().last().t > 0.4 && error.partial().events().len() == 1);
 }
 
-/// A stiffness of 4 to the right and of 1 to the left: half a period of π/2 and one of π, with the same speed in the middle.
+/// A stiffness of 4 to the right and of 1 to the left: half a period takes π/2 and π, respectively, with the same speed
+/// in the middle.
 #[test]
 fn events_set_parameters() {
     let springs = Springs { m: 1.0, k: 4.0 };
@@ -130,7 +131,7 @@ fn events_set_parameters() {
         let x = motion.at(t).expect("inside").q[0];
         assert!((x - exact(t)).abs() < 1e-9, "t = {t}: {x} for {}", exact(t));
     }
-    // Each side of a node has the outputs of its own arc; the energy changes at no time.
+    // The outputs on each side of a node are those of its own arc; the energy does not change.
     let (nodes, outputs) = (motion.states(), motion.outputs());
     let stiffness = outputs.column("stiffness").expect("an output");
     for (node, pair) in nodes.windows(2).enumerate() {
@@ -148,7 +149,7 @@ fn events_set_parameters() {
             .all(|energy| (energy - 2.0).abs() < 1e-12)
     );
     assert!(motion.energy_error() < 1e-12 && motion.checkpoint().is_none());
-    // Arcs: 1 + number of events; settings are those made, statistics add up.
+    // The number of arcs is 1 + the number of events; there are as many settings as were made, and statistics add up.
     let arcs: Vec<_> = motion.arcs().collect();
     assert_eq!(arcs.len(), motion.events().len() + 1);
     assert_eq!(motion.settings().len(), motion.events().len());
@@ -158,13 +159,13 @@ fn events_set_parameters() {
         assert_eq!(arc.nodes.start, setting.node);
         assert_eq!(stiffness[setting.node], setting.value);
     }
-    // The integral of an output takes the parameter of its arc: over a period, each half has the mean energy 1.
+    // The integral of an output uses the parameters of each arc: over a period, each half has the mean energy 1.
     let integral = motion.integral(&springs, "potential").expect("an integral");
     let last = motion.last();
     let virial = integral[integral.len() - 1] - 0.5 * (2.0 * end);
     let boundary = -0.5 * last.q[0] * last.v[0] / 2.0;
     assert!((virial - boundary).abs() < 1e-9, "{virial} for {boundary}");
-    // The model is as it was, and so is the next run.
+    // The caller's model is unchanged, and the next run gives the same.
     assert_eq!(springs.k, 4.0);
     let again = simulation.run(springs.state([1.0], [0.0]), 0.0..end);
     assert_eq!(again.expect("a run").states(), motion.states());
@@ -182,13 +183,13 @@ fn what_is_set_goes_together() {
             })
             .run(springs.state([1.0], [0.0]), 0.0..4.0)
     };
-    // Mass and stiffness: the momentum stays, −1, so the speed is half of it.
+    // Mass and stiffness are set: the momentum remains −1, so that the speed is halved.
     let motion = run(Settings::new("m", 2.0).and("k", 8.0)).expect("a run");
     let x = |t: f64| -0.25 * (2.0 * (t - PI / 2.0)).sin();
     assert!((motion.at(2.0).expect("inside").q[0] - x(2.0)).abs() < 1e-12);
     let node = motion.states()[motion.settings()[0].node];
     assert!((node.v[0] + 0.5).abs() < 1e-13 && (node.p[0] + 1.0).abs() < 1e-13);
-    // With the velocity given its momentum is that of the new mass.
+    // If the velocity is given, its momentum is that with the new mass.
     let motion = run(Settings::new("m", 2.0).and_velocity([-1.0])).expect("a run");
     let node = motion.states()[motion.settings()[0].node];
     assert!((node.v[0] + 1.0).abs() < 1e-13 && (node.p[0] + 2.0).abs() < 1e-13);
@@ -217,7 +218,7 @@ fn what_is_set_goes_together() {
     assert!(matches!(error.kind(), RunErrorKind::SetUnsupported { .. }));
 }
 
-/// Nodes of `steps` are those of a run, with two at each event.
+/// The nodes of `steps` are those of a run, with two at each event.
 #[test]
 fn steps_meet_the_events_of_a_run() {
     let bounce = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.9));
@@ -299,13 +300,13 @@ fn impacts_are_consistent_with_constraints() {
     let theta = reference.last().q[0];
     assert!((motion.last().q[0] - l * theta.sin()).abs() < 1e-8);
     assert!(motion.constraint_residual().velocity < 1e-10);
-    // An impulse against the rod is taken up by it; along it, it acts in full.
+    // The rod takes up the part of an impulse against it; along the circle, the impulse acts in full.
     let kick = Simulation::new(&rod)
         .element(Mixed::<6>)
         .step(0.01)
         .on("wall", Crossing::Falling, |event| {
             let (x, y) = (event.q[0] / 1.3, event.q[1] / 1.3);
-            // Away from the pivot by 5, along the circle so that the velocity turns round.
+            // An impulse of 5 along the rod, and one along the circle that reverses the velocity.
             let along = -2.0 * (event.p[1] * x - event.p[0] * y);
             Act::Impulse([5.0 * x - along * y, 5.0 * y + along * x])
         })
@@ -324,10 +325,10 @@ fn impacts_are_consistent_with_constraints() {
     assert!((kick.last().q[0] - l * theta.sin()).abs() < 1e-8);
 }
 
-/// The estimate goes across events: what is asked is met, and what is estimated is within a factor of what is wrong.
+/// Estimates hold across events: the accuracy asked for is met, and the estimate is within a factor of the true error.
 #[test]
 fn accuracy_is_met_across_events() {
-    // Bounces from 1, e = 0.8: the height at the end is known.
+    // A ball bounces from height 1 with e = 0.8: its height at the end is known in closed form.
     let e: f64 = 0.8;
     let bounce = move |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(e));
     let motion = Simulation::new(&BALL)
@@ -349,7 +350,7 @@ fn accuracy_is_met_across_events() {
     assert_eq!(motion.events().len(), count);
     assert!((motion.last().q[0] - exact).abs() <= 1e-9);
 
-    // A pendulum that hits a stop, with nothing known in closed form: beside a run that is far better.
+    // A pendulum that hits a stop, without closed form: compared with a far more accurate run.
     #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + 4*cos(theta), event(stop) = theta + 0.3)]
     struct Stopped;
     let hit = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.9));
@@ -397,7 +398,7 @@ fn accuracy_is_met_across_events() {
             "{estimate:e} for {error:e}"
         );
     }
-    // Stopped: the state at the event is compared.
+    // If a run stops, the states at the event are compared.
     let motion = Simulation::new(&Stopped)
         .on("stop", Crossing::Falling, |_| Act::Stop)
         .accuracy(1e-8)
@@ -407,7 +408,7 @@ fn accuracy_is_met_across_events() {
     assert!((motion.last().t - event.t).abs() < 1e-8 && motion.last().q[0] + 0.3 < 1e-12);
 }
 
-/// Ensembles look for events, run by run.
+/// Ensembles handle the events of each run separately.
 #[test]
 fn ensembles_meet_the_events_of_single_runs() {
     let bounce = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.9));
@@ -424,13 +425,14 @@ fn ensembles_meet_the_events_of_single_runs() {
     assert_eq!(ends.nodes().count(), starts.len());
     for (start, end) in starts.iter().zip(ends.nodes()) {
         let motion = single.run(*start, 0.0..1.5).expect("a run");
-        // Velocities are looked for from that of another node, and may differ by a rounding.
+        // The search for the velocity of a momentum starts from that of another node, and may differ by a rounding
+        // error.
         assert_eq!(
             (end.t, end.state()),
             (motion.last().t, motion.last().state())
         );
     }
-    // In parts, too, to the bit.
+    // Also as continued runs, with the same bits.
     let states = |ends: tfe::ensemble::Ends<1>| {
         let states = ends.nodes().map(|node| (node.t, node.state()));
         states.collect::<Vec<_>>()
@@ -445,7 +447,7 @@ fn ensembles_meet_the_events_of_single_runs() {
         let end = parts.run_to(1.5).expect("runs");
         assert_eq!(states(end), states(ends.clone()));
     }
-    // What has stopped stays where it did.
+    // Runs that have stopped remain where they did.
     let stopped = ensemble.on("height", Crossing::Falling, |_| Act::Stop);
     let mut parts = stopped.begin(&starts, 0.0).expect("starts");
     let ends = stopped.run(&starts, 0.0..1.5).expect("runs");
@@ -456,7 +458,7 @@ fn ensembles_meet_the_events_of_single_runs() {
             assert_eq!((node.t, &node == last), (end.min(last.t), last.t <= end));
         }
     }
-    // Some come to rest: failures of their own.
+    // Some come to rest: these are failures of their own runs only.
     let dull = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.5));
     let ends = Ensemble::new(&BALL)
         .step(0.07)
@@ -466,7 +468,8 @@ fn ensembles_meet_the_events_of_single_runs() {
     assert!(ends.failures().count() > 0 && ends.nodes().count() > 0);
 }
 
-/// One run is two halves of it, to the bit: nodes, and all events with their times; with impacts, with events that only are recorded, and with those that change nothing.
+/// One run compared with two halves of it: all nodes, events and their times have the same bits; with impacts, with
+/// events that are only recorded, and with those that change nothing.
 #[test]
 fn halves_of_runs_with_events() {
     fn halves<M: tfe::Model<N> + Sync, const N: usize>(
@@ -511,7 +514,8 @@ fn halves_of_runs_with_events() {
     }
 }
 
-/// A particle in a magnetic field, whose momenta are no multiples of velocities: its impacts are found to roundings of these momenta, in the run and at states nearby, from which matrices take their derivatives.
+/// A particle in a magnetic field, whose momenta are not proportional to velocities: its impacts are found up to
+/// rounding errors of these momenta, in the run and at neighbouring states, from which matrices are computed.
 #[test]
 fn impacts_with_momenta_of_a_field() {
     #[dynamics(
@@ -560,7 +564,7 @@ fn impacts_with_momenta_of_a_field() {
     assert!(impacts > 20, "{impacts}");
 }
 
-/// Runs whose events have set parameters have no model to go on with, and say so.
+/// After a run whose events have set parameters, the caller has no model with which to continue: this is an error.
 #[test]
 fn parts_of_ensembles_whose_events_set_parameters() {
     let springs = Springs { m: 1.0, k: 4.0 };
@@ -572,7 +576,7 @@ fn parts_of_ensembles_whose_events_set_parameters() {
         });
     let mut parts = ensemble.begin(&starts, 0.0).expect("starts");
     let whole = ensemble.run(&starts, 0.0..1.0).expect("runs");
-    // One passes the middle in the first part, the other in the second.
+    // One crosses the middle in the first part, the other in the second.
     let first = parts.run_to(1.0).expect("runs");
     assert_eq!(first.into_results(), whole.into_results());
     let second = parts.run_to(2.0).expect("runs");
@@ -585,7 +589,7 @@ fn parts_of_ensembles_whose_events_set_parameters() {
     assert_eq!((third.nodes().count(), third.failures().count()), (0, 2));
 }
 
-/// What stops at the very end of a part does not go on in the next.
+/// A run that stops exactly at the end of a part does not continue in the next.
 #[test]
 fn parts_that_end_where_an_event_stops() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^4/4, event(alarm) = t - 0.3)]
@@ -615,7 +619,7 @@ fn parts_that_end_where_an_event_stops() {
     }
 }
 
-/// A part that ends where it begins leaves the grid as it was.
+/// A part that ends where it begins does not change the grid.
 #[test]
 fn parts_without_a_length() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^4/4 + x*sin(3*t))]

@@ -1,4 +1,4 @@
-//! What is looked at for less than an element's polynomial takes.
+//! Bounds that prove that an event cannot happen in an element: they must cost less than evaluating its polynomial.
 
 use super::*;
 use tfe::runtime::step::{Control, Stepper};
@@ -12,7 +12,7 @@ use tfe::runtime::{Form, Model};
 )]
 struct DoublePendulum;
 
-/// A mass matrix that is no diagonal, and constant.
+/// A constant mass matrix that is not diagonal.
 #[dynamics(
     coordinates(a, b),
     lagrangian = dot(a)^2 + dot(b)^2/2 + dot(a)*dot(b)/2 + 9.81*(2*cos(a) + cos(b)),
@@ -20,7 +20,7 @@ struct DoublePendulum;
 )]
 struct Coupled;
 
-/// In phase space, with the time and friction.
+/// A Hamiltonian with time-dependent terms and friction.
 #[dynamics(
     coordinates(x, y),
     momenta(px, py),
@@ -42,7 +42,7 @@ fn elements() -> Vec<Element> {
     mixed.chain(others).collect()
 }
 
-/// How often a box was to be had, of steps that are made with all points at once.
+/// How often there was a bound on the state within a step, for steps that evaluate all points at once.
 fn boxes<M: Model<N>, const N: usize>(model: &M, start: State<N>, h: f64) -> usize {
     const STEPS: i32 = 40;
     let mut count = 0;
@@ -104,7 +104,7 @@ fn polynomials_stay_in_their_boxes() {
     assert!(boxes(&Coupled, far, 0.01) > 100);
 }
 
-/// Nodes that are not recorded make no difference to a motion and its events.
+/// Whether nodes are recorded has no effect on a motion and its events.
 #[test]
 fn events_are_those_of_runs_that_keep_all_nodes() {
     fn compare<M: Model<N> + Send + Sync, const N: usize>(
@@ -117,7 +117,7 @@ fn events_are_those_of_runs_that_keep_all_nodes() {
             let run = Simulation::new(model)
                 .step(h)
                 .on(output, Crossing::Either, |event| {
-                    // Every other one is a bounce.
+                    // Every other event is a bounce.
                     match event.rises {
                         true => Act::Record,
                         false => Act::Restart(event.state()),
@@ -132,14 +132,14 @@ fn events_are_those_of_runs_that_keep_all_nodes() {
             assert_eq!(all.events(), some.events(), "h = {h}");
             assert_eq!(all.last().q, some.last().q, "h = {h}");
             met += all.events().len();
-            // A restart that changes nothing is no crossing more.
+            // A restart that changes nothing must not lead to another event.
             let recorded = Simulation::new(model)
                 .step(h)
                 .on(output, Crossing::Either, |_| Act::Record);
             let [a, b] = [&run, &recorded]
                 .map(|run| run.run(start, 0.0..8.0).expect("a run").events().len());
             assert_eq!(a, b, "h = {h}");
-            // As if nobody looked.
+            // The same as without the event.
             let never = Simulation::new(model).step(h).record_every(100);
             let watched = never.clone().on(output, Crossing::Either, |_| Act::Record);
             let [a, b] = [never, watched].map(|run| run.run(start, 0.0..60.0).expect("a run"));

@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// The product of the matrices is the derivative of the end of whole runs, across six impacts of the tip of a double pendulum on a wall.
+/// The product of the matrices is the derivative of the end of whole runs, across six impacts of the tip of a double
+/// pendulum on a wall.
 #[test]
 fn matrices_go_across_impacts() {
     let pendulum = TwoLinks { g: 9.81, w: 0.6 };
@@ -44,7 +45,7 @@ fn matrices_go_across_impacts() {
             let (high, low) = (moved(distance), moved(-distance));
             std::array::from_fn(|row| (high[row] - low[row]) / (2.0 * distance))
         };
-        // Extrapolated: of fourth order.
+        // Extrapolated differences, of fourth order.
         let (far, near) = (difference(2e-5), difference(1e-5));
         for row in 0..4 {
             let expected = (4.0 * near[row] - far[row]) / 3.0;
@@ -56,7 +57,7 @@ fn matrices_go_across_impacts() {
             );
         }
     }
-    // Without losses impacts are symplectic.
+    // Without losses, impacts are symplectic.
     let elastic = Simulation::new(&pendulum)
         .element(Mixed::<6>)
         .step(0.02)
@@ -73,7 +74,8 @@ fn matrices_go_across_impacts() {
     assert!(run.motion().energy_error() < 1e-9);
 }
 
-/// Parameters that change on the way: x from rest at 1 with k = 4, then 1. The saltation of a force that jumps at x = 0, where it vanishes, is none: the matrix is the product of two rotations.
+/// Parameters that change during the run: x from rest at 1 with k = 4, then k = 1. The force vanishes at x = 0, where k
+/// changes, so that there is no jump in the matrix (saltation): it is the product of two rotations.
 #[test]
 fn matrices_go_across_settings() {
     let springs = Springs { m: 1.0, k: 4.0 };
@@ -82,7 +84,7 @@ fn matrices_go_across_settings() {
         Crossing::Either,
         |event| Act::Set(Settings::new("k", if event.rises { 4.0 } else { 1.0 })),
     );
-    // A whole period: every motion is periodic with the same period, so the matrix is the identity.
+    // A whole period: all motions have the same period, so that the matrix is the identity.
     let run = simulation
         .run_linearised(springs.state([1.0], [0.0]), 0.0..1.5 * PI)
         .expect("a run");
@@ -98,7 +100,7 @@ fn matrices_go_across_settings() {
     }
 }
 
-/// The iterator gives the events of a run; its matrices are derivatives of the return map.
+/// The iterator returns the events of a run, with the derivatives of the return map as matrices.
 #[test]
 fn sections_are_events_with_matrices() {
     let start = State {
@@ -121,7 +123,7 @@ fn sections_are_events_with_matrices() {
         assert!((point.t - event.t).abs() < 1e-12 && point.transition().is_none());
         assert!((point.q[1] - event.q[1]).abs() < 1e-12);
     }
-    // Five returns, by the start.
+    // Five returns, by the initial state.
     let mut product = nalgebra::DMatrix::identity(4, 4);
     let section = simulation.section("section", Crossing::Rising, start, 0.0);
     for point in section.linearised().take(5) {
@@ -137,7 +139,8 @@ fn sections_are_events_with_matrices() {
         let point = points(moved).nth(4).expect("endless");
         [point.p[0], point.p[1], point.q[0], point.q[1]]
     };
-    // The start lies on the section: a change along the normal moves the first crossing to before it, or is one itself.
+    // The initial state lies on the section: after a change normal to it, the first crossing may be before the start,
+    // or the start itself.
     for column in [0, 1, 3] {
         let difference =
             |s: f64, row: usize| (end(column, s)[row] - end(column, -s)[row]) / (2.0 * s);
@@ -150,7 +153,8 @@ fn sections_are_events_with_matrices() {
             );
         }
     }
-    // Section coordinates y, p_y: the return map keeps the area at constant energy, and g stays zero.
+    // In the coordinates y, p_y of the section the return map preserves the area at constant energy, and g remains
+    // zero.
     assert!((0..4).all(|column| product[(2, column)].abs() < 1e-9 * product.amax()));
     let error = simulation
         .section("sektion", Crossing::Rising, start, 0.0)
@@ -160,7 +164,8 @@ fn sections_are_events_with_matrices() {
     assert!(matches!(error, RunErrorKind::NoEvent { .. }));
 }
 
-/// With constraints, whose matrices are singular: products along motions that these allow are derivatives of the points, of places and of velocities.
+/// With constraints the matrices are singular: their products with admissible directions are derivatives of the
+/// positions and velocities of the points.
 #[test]
 fn sections_with_constraints_have_matrices_of_the_motions_allowed() {
     #[dynamics(
@@ -185,7 +190,7 @@ fn sections_with_constraints_have_matrices_of_the_motions_allowed() {
             [vx[0], vx[0] + vx[1], vy[0], vy[0] + vy[1]],
         )
     };
-    // Along one angle, or along its rate.
+    // The directions of one angle, and of its rate.
     let moved = |which: usize, s: f64| {
         let (mut angles, mut rates) = ([0.9, -0.4], [0.2, 0.1]);
         match which.checked_sub(2) {
@@ -235,11 +240,13 @@ fn sections_with_constraints_have_matrices_of_the_motions_allowed() {
     }
 }
 
-/// x″ + x = F cos ωt against a wall at x = 0 with restitution e: orbits with one impact in n periods of the forcing, in closed form.
+/// x″ + x = F cos ωt with a wall at x = 0 and the coefficient of restitution e: orbits with one impact in n periods of
+/// the forcing, in closed form.
 ///
-/// From an impact at t = 0 with the forcing F cos(ωt + ψ), γ = F/(1 − ω²), P = γ cos ψ, S = −γω sin ψ and T = 2πn/ω: x = a cos t + b sin t + γ cos(ωt + ψ) with a = −P and
-/// b = a tan T/2, S = −b (1 − e)/(1 + e), so b² (cot² T/2 + ((1 − e)/((1 + e) ω))²) = γ². The monodromy matrix has the determinant e² and the trace −2e cos T + (1 + e) f sin T/v₋ with the
-/// acceleration f = F cos ψ at the impact.
+/// From an impact at t = 0 with the forcing F cos(ωt + ψ), γ = F/(1 − ω²), P = γ cos ψ, S = −γω sin ψ and T = 2πn/ω: x
+/// = a cos t + b sin t + γ cos(ωt + ψ) with a = −P and b = a tan T/2, S = −b (1 − e)/(1 + e), so b² (cot² T/2 + ((1 −
+/// e)/((1 + e) ω))²) = γ². The monodromy matrix has the determinant e² and the trace −2e cos T + (1 + e) f sin T/v₋,
+/// where f = F cos ψ is the acceleration at the impact.
 #[test]
 fn orbits_with_impacts_are_those_of_closed_forms() {
     #[dynamics(
@@ -261,7 +268,7 @@ fn orbits_with_impacts_are_those_of_closed_forms() {
         let b = -gamma.abs() / (cot * cot + (loss / omega).powi(2)).sqrt();
         let (a, s) = (b * cot, -b * loss);
         let psi = (-s / (gamma * omega)).atan2(-a / gamma);
-        // From the middle of the flight on.
+        // The orbit starts in the middle of the flight.
         let model = ImpactOscillator { f, omega };
         let from = psi / omega + period / 2.0;
         let (half, angle) = (period / 2.0, omega * period / 2.0 + psi);
@@ -308,7 +315,7 @@ fn orbits_with_impacts_are_those_of_closed_forms() {
     }
 }
 
-/// Orbits that switch, with their period: a spring that is stiff on one side.
+/// Orbits that switch parameters, with unknown period: a spring that is stiffer on one side.
 #[test]
 fn orbits_with_settings_and_unknown_periods() {
     let springs = Springs { m: 1.0, k: 4.0 };
@@ -337,7 +344,8 @@ fn orbits_with_settings_and_unknown_periods() {
     assert!(matches!(error, tfe::periodic::OrbitError::Stopped { .. }));
 }
 
-/// A state that comes back with another spring behind it: the next period is another motion, so that this is no orbit.
+/// The state returns, but with another spring: the next period is a different motion, so that this is not a periodic
+/// orbit.
 #[test]
 fn orbits_bring_parameters_back() {
     let springs = Springs { m: 1.0, k: 1.0 };

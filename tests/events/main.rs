@@ -1,4 +1,4 @@
-//! Events: when they are met, and what is done there.
+//! Events: the times at which they are found, and what is done there.
 
 mod acts;
 mod clear;

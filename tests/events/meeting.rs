@@ -1,8 +1,9 @@
-//! All events are met, at the right time and in order, and none that is not there.
+//! All events are found, at the right times and in order, and none that does not exist.
 
 use super::*;
 
-/// Fifty bounces, tₖ₊₁ = tₖ + 2 eᵏ⁺¹ v/g: hops become shorter than an element, and than a sample of it.
+/// Fifty bounces, tₖ₊₁ = tₖ + 2 eᵏ⁺¹ v/g: hops become shorter than an element, and than the spacing of the samples in
+/// it.
 #[test]
 fn a_ball_bounces_when_it_should() {
     for (step, e) in [(0.01, 0.9), (0.07, 0.9), (0.5, 0.8), (0.01, 0.8)] {
@@ -34,7 +35,7 @@ fn a_ball_bounces_when_it_should() {
                 );
                 assert!(event.q[0].abs() < 1e-14 && !event.rises && event.v[0] < 0.0);
             }
-            // Two nodes at each bounce, one with either velocity; dense output stays above the ground.
+            // Two nodes at each bounce, with the velocities before and after it; dense output stays above the ground.
             let doubled = motion
                 .states()
                 .windows(2)
@@ -51,7 +52,7 @@ fn a_ball_bounces_when_it_should() {
     }
 }
 
-/// It comes to rest by infinitely many bounces.
+/// The ball comes to rest after infinitely many bounces.
 #[test]
 fn bounces_without_end_are_told() {
     let error = Simulation::new(&BALL)
@@ -72,7 +73,8 @@ fn bounces_without_end_are_told() {
     assert!(error.partial().last().t > 1.0 && error.partial().events().len() > 20);
 }
 
-/// Impacts that leave nothing of the velocity, or less than is seen: it fell through the ground without a word.
+/// Impacts after which the velocity is zero, or too small to be detected: the ball used to fall through the ground
+/// without an error.
 #[test]
 fn what_impacts_stop_does_not_fall_through() {
     for (e, step) in [(0.0, 0.1), (0.0, 0.01), (1e-11, 0.1), (0.005, 0.1)] {
@@ -95,7 +97,8 @@ fn what_impacts_stop_does_not_fall_through() {
     }
 }
 
-/// x = cos t: pairs within one element and one sample, roots at nodes, backwards, all in order and with their directions.
+/// x = cos t: pairs of events between two samples of an element, roots at nodes, backwards in time; all are found, in
+/// order and with their directions.
 #[test]
 fn all_crossings_of_an_oscillator_are_met() {
     for level in [0.0, 0.5, 0.99, 0.9999, 1.0 - 1e-10, -0.9999, 1.0001] {
@@ -119,7 +122,7 @@ fn all_crossings_of_an_oscillator_are_met() {
             }
             let found: Vec<_> = motion.events().iter().map(|event| sign * event.t).collect();
             assert_eq!(found.len(), expected.len(), "{level}, h = {h}: {found:?}");
-            // Near the top x is flat: roundings of x are larger ones of the time.
+            // Near its maximum x is flat: a rounding error of x corresponds to a larger error of the time.
             let most = 1e-13 / (1.0 - level * level).abs().sqrt();
             for (k, (time, expected)) in found.iter().zip(&expected).enumerate() {
                 assert!(
@@ -144,7 +147,7 @@ fn section(start: State<2>, element: Element, step: f64, end: f64) -> Vec<[f64; 
     motion.events().iter().map(point).collect()
 }
 
-/// Regular motion, so that errors grow with the time alone: a section against one of a tenth of the step.
+/// A regular motion, whose errors grow only linearly: a section compared with one computed with a tenth of the step.
 #[test]
 fn a_thousand_points_of_a_section_are_those_of_finer_runs() {
     let start = State {
@@ -159,7 +162,7 @@ fn a_thousand_points_of_a_section_are_those_of_finer_runs() {
         points.len()
     );
     for (point, fine) in points.iter().zip(&finer) {
-        // Two roundings of the time, which is 9e-13 apart at the end.
+        // Two rounding errors of the time, which is known to 9e-13 at the end.
         let most = [2.0 * fine[0] * f64::EPSILON, 1e-12, 1e-12];
         for ((a, b), most) in point.iter().zip(fine).zip(most) {
             assert!((a - b).abs() <= most, "{point:?} for {fine:?}");
@@ -167,8 +170,9 @@ fn a_thousand_points_of_a_section_are_those_of_finer_runs() {
     }
 }
 
-/// Random events of random motions, among them pairs closer than a scan sees, products, waves, jumps and functions of the time, beside scans in 8000 places.
-/// `cargo run --release --example events_beside_scans -- 100000` does the same with more of them.
+/// Random events of random motions, compared with scans at 8000 times; among them are pairs closer than the scan
+/// resolves, products, waves, jumps and functions of the time. `cargo run --release --example events_beside_scans --
+/// 100000` makes more of them.
 #[test]
 fn events_are_those_of_a_scan() {
     let (mut random, mut tally) = (scans::Random(7), scans::Tally::default());
@@ -204,7 +208,7 @@ fn simultaneous_events_are_all_met() {
         last.q[0].abs() < 1e-14 && last.q[1].abs() < 1e-14,
         "{last:?}"
     );
-    // What an impact stops without a force that presses it on slides along the wall.
+    // After an impact without rebound, and without a force towards the wall, the mass slides along the wall.
     for start in [1.0, 0.05, 3.7] {
         let slide = Simulation::new(&Corner)
             .step(0.3)
@@ -226,8 +230,10 @@ fn simultaneous_events_are_all_met() {
     }
 }
 
-/// A pendulum in Cartesian coordinates that hits a wall: the same as that of an angle, with multipliers of its rod that hold across.
-/// At late times a state behind an impact is beside the wall by what a rounding of the time makes of it; in a short rest of its element that is much, and was taken for another impact.
+/// A pendulum in Cartesian coordinates that hits a wall: the same as a pendulum in an angle, with multipliers of its
+/// rod that are right on both sides of impacts. At late times, the state after an impact differs from the wall by the
+/// effect of a rounding error of the time. In a short remaining element this is large relative to the motion, and was
+/// taken for another impact.
 #[test]
 fn impacts_at_late_times_happen_once() {
     #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - y, event(impact) = y)]
@@ -253,10 +259,11 @@ fn impacts_at_late_times_happen_once() {
     }
 }
 
-/// Of times far from zero fewer digits are known than of steps: behind impacts the motion is that of a run from zero all the same, also backwards.
+/// Times far from zero have fewer digits than step sizes. After impacts, the motion must be that of a run from zero all
+/// the same, also backwards in time.
 #[test]
 fn motions_behind_late_impacts_have_the_digits_of_the_step() {
-    // Times of nodes, up to the end, are exact.
+    // The times of nodes, up to the end, are exact.
     let step = 1.0 / 128.0;
     for sign in [1.0, -1.0] {
         let last = |start: f64| {
@@ -272,14 +279,14 @@ fn motions_behind_late_impacts_have_the_digits_of_the_step() {
         let (q, v) = last(0.0);
         for start in [1e6, 1e9, -1e9] {
             let (late_q, late_v) = last(start);
-            // Of four impacts each is met to 1e-12 of a step.
+            // Four impacts, each found to 1e-12 of a step.
             assert!((late_q - q).abs() < 1e-11, "{start}: {late_q} for {q}");
             assert!((late_v - v).abs() < 1e-11, "{start}: {late_v} for {v}");
         }
     }
 }
 
-/// A function that the model does not declare, beside the output that is the same.
+/// A function given by the caller, compared with an equal output of the model.
 #[test]
 fn functions_are_events() {
     let model = Oscillator { level: 0.3 };
@@ -304,7 +311,7 @@ fn functions_are_events() {
     for (a, b) in declared.events().iter().zip(function.events()) {
         assert!((a.t - b.t).abs() < 1e-14 && a.rises == b.rises && a.name == b.name);
     }
-    // Derivatives, and impacts, know it as well: the energy ½ (v² + x²) − ⅛ and a moving wall.
+    // Derivatives and impacts also use the function: the energy ½ (v² + x²) − ⅛, and a moving wall.
     let energy = simulation.clone().on_function(
         "wall",
         Crossing::Falling,
@@ -343,7 +350,7 @@ fn functions_are_events() {
     }
 }
 
-/// A value that touches zero, and one that grazes it so that both crossings lie within a hundredth of an element.
+/// A value that touches zero, and one with both crossings within a hundredth of an element.
 #[test]
 fn tangent_events() {
     for (over, count) in [(0.0, 0), (-1e-9, 0), (1e-6, 2), (1e-10, 2)] {
@@ -363,7 +370,7 @@ fn tangent_events() {
     }
 }
 
-/// A ball that bounces on the surface of a section: its points are before the bounces.
+/// A ball that bounces on the surface of a section: the points of the section are the states before the bounces.
 #[test]
 fn sections_see_what_acts_on_their_surface() {
     let simulation = Simulation::new(&BALL)
@@ -384,7 +391,7 @@ fn sections_see_what_acts_on_their_surface() {
     assert_eq!(count, 3);
 }
 
-/// Impulses act in the order of time, whatever the order in which they were declared: before an event in their element, too.
+/// Impulses act in the order of time, in whatever order they were declared; also those before an event in its element.
 #[test]
 fn impulses_before_an_event_act_in_order() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, event(place) = x - 0.05)]
@@ -426,7 +433,8 @@ fn impulses_before_an_event_act_in_order() {
     assert!((point.p[0] - 2.0).abs() < 1e-13, "{point:?}");
 }
 
-/// An element with a point at its start that begins at a break finds the force behind it, up to an event, too.
+/// An element with a quadrature point at its start that begins at a break uses the force after the break, also if it is
+/// shortened by an event.
 #[test]
 fn events_behind_a_break() {
     #[dynamics(
@@ -456,7 +464,7 @@ fn events_behind_a_break() {
     let last = simulation.steps(start, 0.0).last();
     let last = last.expect("a step").expect("a step");
     is_there(last.t, last.q[0], last.p[0]);
-    // The momentum there does not depend on when the event comes.
+    // The momentum there does not depend on the time of the event.
     let sensitive = simulation.run_sensitive(start, 0.0..1.0).expect("a run");
     let slopes = sensitive.by_start().last();
     let expected = [[1.0, 0.0], [0.0, 0.0]];

@@ -1,11 +1,11 @@
-//! Events near each other, near nodes, and at one time: each is met once, in order.
+//! Events close to each other, close to nodes, and simultaneous ones: each is found once, in order.
 
 use super::*;
 
-/// Between events, on either side of what roundings of the time can tell.
+/// Distances between events, below and above the resolution of the time.
 const DISTANCES: [f64; 9] = [1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7];
 
-/// The node at a time, of an element that ends there.
+/// The node at a time, from an element that ends there.
 fn node_at(
     simulation: &Simulation<'_, HenonHeiles, 2>,
     start: State<2>,
@@ -30,7 +30,7 @@ fn turned([x, y]: [f64; 2], angle: f64) -> [f64; 2] {
     [cosine * x - sine * y, sine * x + cosine * y]
 }
 
-/// The events of a run, in the order of its time, are each there once and near the time that belongs to its name.
+/// Asserts that each event occurs once, in the order of the run and close to the time that belongs to its name.
 #[track_caller]
 fn check(motion: &Motion<2>, expected: &[(&str, f64)], error: f64, what: &str) {
     let sign = motion.last().t.signum();
@@ -51,8 +51,9 @@ fn check(motion: &Motion<2>, expected: &[(&str, f64)], error: f64, what: &str) {
     }
 }
 
-/// Three lines that a curved motion crosses within 1e-15 to 1e-7 of a time, in all orders. Polynomials of low degree have other times, and where they have another order, the element that
-/// ends at the first event has the second one behind it already: it was lost, or met twice if it only was recorded.
+/// Three lines that a curved motion crosses at times 1e-15 to 1e-7 apart, in all orders. Polynomials of low degree have
+/// slightly different crossing times. If they have another order, the element that ends at the first event is already
+/// past the second one, which used to be lost, or found twice if the first was only recorded.
 #[test]
 fn near_events_are_met_once_each() {
     let elements = [
@@ -79,7 +80,7 @@ fn near_events_are_met_once_each() {
             let start = State { q, p };
             let (time, end) = (sign * 1.37 * h, sign * 2.0 * h);
             let at = node_at(&simulation, start, time, end);
-            // Vanishes when the motion has passed the node by a time.
+            // Vanishes a given time after the motion has passed the node.
             let line = |angle: f64, later: f64| {
                 let normal = turned(at.v, angle);
                 let value = dot(normal, at.q) + later * dot(normal, at.v);
@@ -107,7 +108,8 @@ fn near_events_are_met_once_each() {
     }
 }
 
-/// The same of a place and a velocity: that of a polynomial is not that of its nodes, so that behind an event it may be back where it came from.
+/// The same for positions and velocities: the velocity of a polynomial is not that of its nodes, so that after an event
+/// the value may be back on the side from where it came.
 #[test]
 fn near_events_of_velocities_are_met_once_each() {
     let starts = [
@@ -156,7 +158,8 @@ fn near_events_of_velocities_are_met_once_each() {
     }
 }
 
-/// Three calls of `on` for each impact, whichever side of the ground roundings leave the ball on: the second and the third are given what the first has done.
+/// Three calls of `on` for each impact, on whichever side of the ground the ball is by rounding: the second and the
+/// third are given the state that the first has made.
 #[test]
 fn calls_for_one_event_act_in_the_order_of_their_declaration() {
     const E: f64 = 0.7;
@@ -188,7 +191,7 @@ fn calls_for_one_event_act_in_the_order_of_their_declaration() {
                 assert!((two.v[0] + E * one.v[0]).abs() < 1e-14, "{two:?}");
                 assert_eq!(two.v, three.v);
             }
-            // Before it they are given what it has not done yet.
+            // Those before it are given the state without its act.
             let before = simulation.on("height", Crossing::Either, record).on(
                 "height",
                 Crossing::Falling,
@@ -199,7 +202,7 @@ fn calls_for_one_event_act_in_the_order_of_their_declaration() {
             for met in motion.events().chunks(2) {
                 assert_eq!((met[0].t, met[0].v), (met[1].t, met[1].v), "{height}");
             }
-            // What stops the run is the last.
+            // The act that stops the run is the last one.
             let stopped = Simulation::new(&BALL)
                 .step(step)
                 .on("height", Crossing::Falling, record)
@@ -212,7 +215,7 @@ fn calls_for_one_event_act_in_the_order_of_their_declaration() {
     }
 }
 
-/// Where an impact falls on the very end of a run there is nothing left to go on with, and all that belongs to it is done nonetheless.
+/// An impact exactly at the end of a run: there is nothing to continue, but all acts that belong to it are done.
 #[test]
 fn events_at_the_very_end_are_all_met() {
     let bounce = |event: &tfe::Occurrence<'_, 1>| {
@@ -237,7 +240,7 @@ fn events_at_the_very_end_are_all_met() {
     assert!(counts[0] > 0 && counts[2] > 0, "{counts:?}");
 }
 
-/// Where an act moves another event's value across zero that is no event; it is one where the motion does.
+/// If an act moves the value of another event function across zero, this is not an event; if the motion does so, it is.
 #[test]
 fn acts_that_jump_over_zero_make_no_events() {
     let model = Oscillator { level: 0.0 };
@@ -263,7 +266,8 @@ fn acts_that_jump_over_zero_make_no_events() {
     assert_eq!(names(state(-0.5)), ["place"]);
 }
 
-/// A stiffness that changes whenever the velocity vanishes. Behind these events polynomials begin with a velocity that may not have vanished yet: no event more, and none that comes without end.
+/// A stiffness that changes whenever the velocity vanishes. After such an event, polynomials begin with a velocity that
+/// may not have vanished yet: this must not lead to another event, or to events without end.
 #[test]
 fn parameters_are_set_where_velocities_vanish() {
     let springs = Springs { m: 1.0, k: 4.0 };
@@ -284,7 +288,7 @@ fn parameters_are_set_where_velocities_vanish() {
                 );
             let motion = run.run(start, 0.0..12.0);
             let motion = motion.unwrap_or_else(|error| panic!("{degree}, {step}: {error}"));
-            // An eighth of a period, then half of one with either stiffness.
+            // An eighth of a period, then half a period with each stiffness.
             let mut time = PI / 8.0;
             let halves = [PI, 0.5 * PI].into_iter().cycle();
             assert_eq!(motion.events().len(), 5, "{degree}, {step}");
@@ -296,7 +300,7 @@ fn parameters_are_set_where_velocities_vanish() {
     }
 }
 
-/// A value that is zero for a while between two signs, with and without an event in that while that cuts the element.
+/// A value that is zero for a while between two signs, with and without another event in that interval.
 #[test]
 fn values_that_stay_at_zero_have_one_event() {
     fn flat(_: f64, q: &[f64; 1], _: &[f64; 1]) -> f64 {
@@ -330,7 +334,7 @@ fn values_that_stay_at_zero_have_one_event() {
     }
 }
 
-/// Events within roundings of a node leave a motion that is whole: its elements end where its nodes are.
+/// Events within rounding errors of a node leave a consistent motion: its elements end at its nodes.
 #[test]
 fn events_beside_nodes_leave_motions_whole() {
     let model = Oscillator { level: 0.0 };
@@ -364,7 +368,7 @@ fn events_beside_nodes_leave_motions_whole() {
     }
 }
 
-/// An impulse at the time of an event that cuts its element acts once, before or behind it.
+/// An impulse at the time of an event that shortens its element acts once, before or after the event.
 #[test]
 fn impulses_at_the_times_of_events_act_once() {
     let model = Oscillator { level: 0.0 };
@@ -391,7 +395,8 @@ fn impulses_at_the_times_of_events_act_once() {
     }
 }
 
-/// What an impulse at a node changes its sign is met there, behind the impulse, as on models of run-time length; one at the end of a run acts also where an event comes with it.
+/// A value whose sign an impulse at a node changes has its event there, after the impulse, as in models of run-time
+/// length. An impulse at the end of a run acts also if an event is there.
 #[test]
 fn impulses_at_nodes_are_events_at_nodes() {
     let model = Oscillator { level: 0.0 };
@@ -467,7 +472,7 @@ fn what_falls_in_a_run_back_in_time_is_falling() {
     }
 }
 
-/// A run that begins or ends where a value is zero has not seen it change its sign; one that goes on from there does.
+/// A run that begins or ends where a value is zero has not seen its sign change; a run that continues from there does.
 #[test]
 fn zeros_at_the_ends_of_runs() {
     let model = Oscillator { level: 0.0 };
@@ -497,7 +502,8 @@ fn zeros_at_the_ends_of_runs() {
     }
 }
 
-/// A run that goes on from an event knows all calls that were made for it, not the last one alone: none is made again where the polynomial behind it begins with another velocity than the node.
+/// A run that continues from an event takes account of all acts that were done there, not only of the last: none is
+/// repeated if the polynomial after the event begins with another velocity than the node.
 #[test]
 fn calls_at_the_end_of_a_run_are_not_made_again_behind_it() {
     let model = Oscillator { level: 0.0 };
@@ -525,7 +531,8 @@ fn calls_at_the_end_of_a_run_are_not_made_again_behind_it() {
     }
 }
 
-/// A run that begins where a function vanishes does not meet it there, whatever the polynomial of the first element does within its error.
+/// A run that begins at a zero of a function has no event there, whatever sign the polynomial of the first element has
+/// within its error.
 #[test]
 fn zeros_at_the_start_are_no_events() {
     let model = Oscillator { level: 0.0 };

@@ -1,4 +1,4 @@
-//! Parameters that events set: what runs are compared by, and matrices where the values depend on the state.
+//! Parameters that are set by events: estimates of runs, and transition matrices if the values depend on the state.
 
 use super::*;
 use crate::largest::larger;
@@ -21,7 +21,7 @@ fn numbers<const N: usize>(state: &State<N>) -> Vec<f64> {
     [state.p, state.q].concat()
 }
 
-/// The derivative of the end of a run by a number of its start, ordered (p, q): of fourth order.
+/// The derivative of the end of a run by a number of its initial state, ordered (p, q), by differences of fourth order.
 fn by_start<const N: usize>(
     start: State<N>,
     column: usize,
@@ -46,8 +46,8 @@ fn by_start<const N: usize>(
     pairs.map(|(near, far)| (4.0 * near - far) / 3.0).collect()
 }
 
-/// The mass flies free, with no energy but its own, up to the spring that an event lets it meet: what the estimate of an output knows is that of the parameters behind the event, also where the motion
-/// stays at an event that stops it.
+/// A mass moves freely until an event sets the stiffness of a spring. Outputs, here the energy of the spring, and their
+/// estimates must use the parameters after the event, also if the run stops there.
 #[test]
 fn estimates_of_outputs_are_those_of_the_parameters_set() {
     let free = Springs { m: 1.0, k: 0.0 };
@@ -85,7 +85,8 @@ fn estimates_of_outputs_are_those_of_the_parameters_set() {
     }
 }
 
-/// A value that depends on the state goes with it into the motion behind the event, and matrices from state to state do not hold it.
+/// A value that depends on the state affects the motion after the event, but matrices from state to state do not
+/// contain this dependence: they are refused.
 #[test]
 fn matrices_refuse_settings_by_the_state() {
     #[track_caller]
@@ -123,14 +124,14 @@ fn matrices_refuse_settings_by_the_state() {
             Err(OrbitError::Run(kind)) => check(&kind),
             other => panic!("{other:?}"),
         }
-        // By parameters it is refused whatever is set.
+        // Derivatives by parameters are refused whatever is set.
         let error = simulation.run_sensitive(start, 0.0..3.0);
         let error = error.expect_err("it depends on parameters");
         assert!(matches!(error.kind(), RunErrorKind::SetUnsupported { .. }));
     }
 }
 
-/// A refusal names the call that was made, not one that this makes.
+/// The message names the caller's function, and not an internal one.
 #[test]
 fn refused_derivatives_name_their_call() {
     let (start, span) = (SPRINGS.state([1.0], [0.0]), 0.0..3.0);
@@ -152,7 +153,8 @@ fn refused_derivatives_name_their_call() {
     }
 }
 
-/// Values that are what they are for all motions nearby: of a coordinate that vanishes at the event, on one side of a jump, of a parameter.
+/// Values that are the same for all neighbouring motions: they contain a coordinate that vanishes at the event, one
+/// side of a jump, or a parameter.
 #[test]
 fn matrices_go_across_settings_that_stay() {
     let kept: [Sets; 4] = [
@@ -184,7 +186,8 @@ fn matrices_go_across_settings_that_stay() {
     }
 }
 
-/// What is to depend on the state belongs to it: a coordinate without a momentum in the Hamiltonian is constant between events, and goes into the matrices.
+/// What has to depend on the state can be part of it: a coordinate whose momentum does not occur in the Hamiltonian is
+/// constant between events, and is contained in the matrices.
 #[test]
 fn a_coordinate_takes_the_place_of_a_parameter() {
     #[dynamics(
@@ -227,7 +230,8 @@ fn a_coordinate_takes_the_place_of_a_parameter() {
     }
 }
 
-/// A pendulum on a rod whose bob drags a carriage along x, which is loaded as it passes the bottom: with another mass constraints allow other momenta.
+/// A pendulum with a rod whose bob drags a carriage along x; the carriage is loaded when it passes the bottom. With
+/// another mass, constraints allow other momenta.
 #[test]
 fn what_constraints_allow_is_that_of_parameters_set() {
     #[dynamics(
@@ -254,7 +258,7 @@ fn what_constraints_allow_is_that_of_parameters_set() {
     let start = moved(0.0);
     let run = simulation.run_linearised(start, 0.0..4.0).expect("a run");
     assert!(!run.motion().events().is_empty());
-    // Between the elements nothing is lost of what the constraint allows.
+    // Between the elements, nothing is lost in the directions that the constraint allows.
     let basis = tfe::constraints::tangent_basis(&model, 0.0, &start).expect("a basis");
     let whole = basis.tr_mul(&(run.product() * &basis));
     let mut product = nalgebra::DMatrix::identity(2, 2);
@@ -267,7 +271,7 @@ fn what_constraints_allow_is_that_of_parameters_set() {
         assert!(off < 1e-8 * whole.amax(), "{product} for {whole}");
     }
 
-    // Turning points before the carriage is loaded and after.
+    // Turning points before and after the carriage is loaded.
     let third = |s: f64| {
         let mut section = simulation.section("turn", Crossing::Either, moved(s), 0.0);
         let point = section.nth(2).expect("endless").expect("a point");

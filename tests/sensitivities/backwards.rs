@@ -1,8 +1,8 @@
-//! Gradients of losses.
+//! Gradients of losses by the adjoint (backward) method.
 
 use super::*;
 
-/// The gradient of a loss, backwards, is what derivatives, forwards, make of it.
+/// The backward gradient of a loss equals the one composed of forward derivatives.
 #[track_caller]
 fn check_gradient<M: Model<N> + Sync, const N: usize>(
     simulation: &Simulation<'_, M, N>,
@@ -60,7 +60,7 @@ fn check_gradient<M: Model<N> + Sync, const N: usize>(
     let by_start = s.by_start().output(output).expect("declared");
     let matrix = s.by_start().last();
     for a in 0..N {
-        // The velocity at the end follows from differences of runs only: a loss without it.
+        // The velocity at the end would need differences of runs: use a loss without it.
         let loss = Loss::squares(output, times, values).and(Loss::at_end(|node: &Node<N>| {
             node.q[0].sin() + 0.5 * node.p[N - 1].powi(2)
         }));
@@ -96,7 +96,7 @@ fn gradients_backwards_are_derivatives_forwards() {
         check_gradient(&simulation, start, "height");
         check_gradient(&simulation.impulse(0.42, [0.1, -0.2]), start, "speed");
     }
-    // Steps that are cut into pieces.
+    // With steps that are cut into pieces.
     let simulation = Simulation::new(&PENDULUMS).step(0.9).element(Mixed::<3>);
     check_gradient(&simulation, start, "speed");
     let start = PHASE;
@@ -115,7 +115,7 @@ fn gradients_backwards_are_derivatives_forwards() {
     check_gradient(&Simulation::new(&ROD).step(0.02), start, "height");
 }
 
-/// Times that are one but for the roundings of a sum of many share a node, also with a break and with a node that was given.
+/// Times that differ only by the rounding errors of a long sum share a node, also with a break and with a given node.
 #[test]
 fn squares_at_times_a_few_roundings_apart() {
     let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
@@ -131,7 +131,7 @@ fn squares_at_times_a_few_roundings_apart() {
     }
 }
 
-/// A function of slices, of models of any length, is that of nodes.
+/// A loss given as a function of slices, for models of any length, equals one of nodes.
 #[test]
 fn losses_of_slices_are_those_of_nodes() {
     let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
@@ -149,7 +149,8 @@ fn losses_of_slices_are_those_of_nodes() {
     assert_eq!(by_node.by_start(), by_slices.by_start());
 }
 
-/// Masses in a row, with a friction between neighbours that depends on where they are, and springs that are all different.
+/// A row of masses, with friction between neighbours that depends on their positions, and springs that are all
+/// different.
 #[dynamics(
     coordinates(q[5]),
     lagrangian = sum(i in 0..5, m[i]/2*dot(q[i])^2 + b*q[i]*dot(q[i])^2/2) - sum(i in 0..4, k[i]/2*(q[i+1]-q[i])^2 + a[i]/4*(q[i+1]-q[i])^4) - k[4]/2*q[0]^2,
@@ -177,7 +178,8 @@ const ROW: Row = Row {
     omega: 1.9,
 };
 
-/// Many parameters at once, by operations read backwards; with an iteration and, where steps are too long for it, with factors; of elements with fewer points than go side by side, and more.
+/// Many parameters at once, with the operations traversed backwards: for steps solved by fixed-point iteration, and by
+/// factors where steps are too long for it; for elements with fewer and with more points than there are lanes.
 #[test]
 fn gradients_by_many_parameters_are_derivatives_forwards() {
     let start = ROW.state([0.3, -0.2, 0.1, 0.4, -0.5], [0.1, 0.0, -0.3, 0.2, 0.4]);
@@ -194,7 +196,8 @@ fn gradients_by_many_parameters_are_derivatives_forwards() {
     }
 }
 
-/// A heavy body on a spring of its own, beside light ones on weak springs: what the gradient has of it is smaller by its mass, with as many digits.
+/// A heavy body on a spring of its own, next to light ones on weak springs: its part of the gradient is smaller by its
+/// mass, and must have as many digits.
 #[test]
 fn gradients_of_heavy_bodies_keep_their_digits() {
     let row = Row {
@@ -233,7 +236,7 @@ fn gradients_of_heavy_bodies_keep_their_digits() {
     }
 }
 
-/// Some of many parameters, in any order, have what they have among all.
+/// A selection of many parameters, in any order, has the same derivatives as among all.
 #[test]
 fn some_parameters_backwards_are_those_among_all() {
     let mut state = ROW.state([0.3, -0.2, 0.1, 0.4, -0.5], [0.1, 0.0, -0.3, 0.2, 0.4]);
@@ -296,7 +299,7 @@ fn losses_that_are_none_are_told() {
     );
 }
 
-/// Nodes that are not kept are made again on the way back.
+/// Nodes that are not stored are computed again during the backward sweep.
 #[test]
 fn gradients_of_runs_that_keep_some_nodes_are_those_of_runs_that_keep_all() {
     #[track_caller]
@@ -306,7 +309,7 @@ fn gradients_of_runs_that_keep_some_nodes_are_those_of_runs_that_keep_all() {
         span: std::ops::Range<f64>,
         output: &str,
     ) {
-        // At the start, within, twice at the same time, and at the end.
+        // At the start, inside, twice at the same time, and at the end.
         let length = span.end - span.start;
         let times = [0.0, 0.31, 0.5, 0.5, 1.0].map(|part| span.start + part * length);
         let loss = Loss::at_end(|node: &Node<N>| node.q[0].sin() + node.p[N - 1] * node.v[0])
@@ -348,7 +351,7 @@ fn gradients_of_runs_that_keep_some_nodes_are_those_of_runs_that_keep_all() {
     );
 }
 
-/// With √n of n nodes memory is one of √n.
+/// With √n of n nodes stored, the memory grows as √n.
 #[test]
 fn nodes_that_are_not_kept_take_no_memory() {
     let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);

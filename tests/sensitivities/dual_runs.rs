@@ -1,4 +1,4 @@
-//! Derivatives of whole runs beside those of an oracle in dual numbers, and gradients backwards beside them.
+//! Derivatives of whole runs compared with an independent solver in dual numbers, forward and backward.
 
 mod constrained;
 mod events;
@@ -6,10 +6,11 @@ mod events;
 use super::*;
 use crate::duals::{self, Beside, Phase, number};
 
-/// What the roundings of ten steps, of both solvers, leave of the largest derivative.
+/// The effect of rounding errors in ten steps of both solvers, relative to the largest derivative.
 const ROUNDING: f64 = 1e-12;
 
-/// The largest difference over the largest derivative, by all parameters and by the start, of the end of a run; then the gradient of a loss, backwards, is compared with them.
+/// The largest difference relative to the largest derivative, for derivatives of the end of a run by all parameters and
+/// by the initial state; then the backward gradient of a loss is compared with them.
 fn off<M: Model<N> + Sync, const N: usize>(
     run: &Simulation<'_, M, N>,
     start: State<N>,
@@ -61,7 +62,7 @@ fn off<M: Model<N> + Sync, const N: usize>(
     beside.off()
 }
 
-/// The same of a run of so many steps without constraints and events.
+/// The same for a run with a number of steps, without constraints and events.
 fn off_free<M: Model<N> + Sync, const N: usize>(
     model: &M,
     start: State<N>,
@@ -135,7 +136,7 @@ struct Bent {
     d: f64,
 }
 
-/// Eight models, two elements: what is differentiated is every operation of the run.
+/// Eight models and two elements: every operation of a run is differentiated.
 #[test]
 fn derivatives_are_those_of_runs_in_dual_numbers() {
     let charged = Charged {

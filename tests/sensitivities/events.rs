@@ -13,7 +13,8 @@ fn derivatives_go_through_bounces() {
         .run_sensitive(ball.state([1.0], [0.0]), 0.0..1.5)
         .expect("derivatives");
     assert_eq!(s.motion().events().len(), 2);
-    // From rest at the height H: τ = √(2H/g), the second bounce at 2.6 τ, then y = 0.64 g τ s − g s²/2 with s = t − 2.6 τ.
+    // From rest at height H: τ = √(2H/g), the second bounce is at 2.6 τ, then y = 0.64 g τ s − g s²/2 with s = t − 2.6
+    // τ.
     let tau = |height: f64, g: f64| (2.0 * height / g).sqrt();
     let y = |height: f64, g: f64| {
         let s = 1.5 - 2.6 * tau(height, g);
@@ -25,7 +26,7 @@ fn derivatives_go_through_bounces() {
     assert!((s.by("g").last().q[0] - by_g).abs() < 1e-12);
     let found = s.by_start().last().q_by_q()[(0, 0)];
     assert!((found - by_height).abs() < 1e-11, "{found} {by_height}");
-    // A floor that is raised is a ball that is lowered.
+    // Raising the floor is the same as lowering the ball.
     let by_floor = s.by("floor").last().q[0];
     assert!((by_floor - (1.0 - by_height)).abs() < 1e-11, "{by_floor}");
     assert!(s.by("m").last().q[0].abs() < 1e-12);
@@ -34,7 +35,7 @@ fn derivatives_go_through_bounces() {
     assert!((times[1] + 2.6 * tau(1.0, 9.81) / (2.0 * 9.81)).abs() < 1e-13);
     assert_eq!(s.by("g").event_time(2), None);
     assert_eq!(s.by("g").states().len(), s.motion().states().len());
-    // The velocity before the first bounce is −√(2gH), after it 0.8 times the other way.
+    // The velocity before the first bounce is −√(2gH); after it, 0.8 times the opposite.
     let nodes = s.motion().states();
     let at = nodes
         .windows(2)
@@ -45,7 +46,8 @@ fn derivatives_go_through_bounces() {
     assert!((speeds[at] + rate).abs() < 1e-13 && (speeds[at + 1] - 0.8 * rate).abs() < 1e-12);
 }
 
-/// A floor that is next to zero is one at zero: what it does to the motion, and to a restitution that holds it, is no rounding.
+/// A floor very close to zero has the derivatives of one at zero: its small effects on the motion, and on a restitution
+/// that depends on it, must not be lost as rounding errors.
 #[test]
 fn derivatives_by_small_parameters_go_through_bounces() {
     let by_floor = |floor: f64, part: f64| {
@@ -67,7 +69,7 @@ fn derivatives_by_small_parameters_go_through_bounces() {
     for part in [0.0, 0.5] {
         let expected = by_floor(0.0, part);
         for floor in [1e-12, -1e-15, 1e-20, 1e-150] {
-            // The derivatives themselves differ by some tens of the floor.
+            // The derivatives themselves differ by about the size of the floor times ten.
             for (found, expected) in by_floor(floor, part).into_iter().zip(expected) {
                 let error = (found - expected).abs();
                 assert!(error < 1e-9, "{floor:e}: {found} instead of {expected}");
@@ -76,7 +78,7 @@ fn derivatives_by_small_parameters_go_through_bounces() {
     }
 }
 
-/// A function that vanishes where the only coordinate does, beside numbers that do not.
+/// A function that vanishes together with the only coordinate, next to numbers that do not.
 #[test]
 fn functions_of_a_coordinate_that_vanishes_have_their_derivatives() {
     let ball = Ball {
@@ -101,13 +103,14 @@ fn functions_of_a_coordinate_that_vanishes_have_their_derivatives() {
         let found = run.run_sensitive(start, 0.0..1.5).expect("derivatives");
         assert_eq!(found.motion().events().len(), 2);
         let found = found.by("g").last();
-        // The function has roundings of 4e-16.
+        // The function has rounding errors of 4e-16.
         assert!((found.q[0] - expected.q[0]).abs() < 1e-9, "{found:?}");
         assert!((found.p[0] - expected.p[0]).abs() < 1e-9, "{found:?}");
     }
 }
 
-/// The same ball with an input, whose model belongs to the run; and in velocities of a Hamiltonian, whose mass the momentum after the bounce depends on.
+/// The same ball with an input, whose model belongs to the run; and as a Hamiltonian with a mass, on which the momentum
+/// after the bounce depends.
 #[test]
 fn derivatives_go_through_events_of_other_models() {
     #[dynamics(
@@ -132,7 +135,7 @@ fn derivatives_go_through_events_of_other_models() {
         g: f64,
     }
     fn bounce<const N: usize>(event: &tfe::simulation::Occurrence<'_, N>) -> Act<N> {
-        // Faster the faster it comes: not linear.
+        // The restitution depends on the speed: a nonlinear act.
         Act::Restart(event.state_with_velocity(event.v.map(|v| -0.8 * v - 0.02 * v * v)))
     }
     fn pushed(model: &Pushed) -> Simulation<'_, tfe::Driven<'_, Pushed>, 1> {
@@ -190,7 +193,8 @@ fn derivatives_go_through_events_of_other_models() {
     }
 }
 
-/// Two pendulums that hit a wall, several times, with an impulse along the normal of the wall; and the derivative where the run stops at the next one.
+/// Two pendulums that hit a wall several times, with an impulse along the normal of the wall; and the derivatives if
+/// the run stops at the next impact.
 #[test]
 fn derivatives_go_through_impacts() {
     #[dynamics(
@@ -224,7 +228,8 @@ fn derivatives_go_through_impacts() {
     assert_eq!(s.motion().events().len(), 2);
 }
 
-/// Where an event stops a run its end moves, and with it what a loss has of the time: y = 1 + v t − g t²/2 from rest.
+/// If an event stops a run, the time of its end changes, and with it a loss that depends on the time: y = 1 + v t − g
+/// t²/2 from rest.
 #[test]
 fn losses_of_the_time_of_an_event_move_with_it() {
     #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y, event(hit) = y, output(height) = y, output(clock) = t)]
@@ -250,7 +255,7 @@ fn losses_of_the_time_of_an_event_move_with_it() {
         assert!((by_start.p[0] - 0.1).abs() < 1e-9, "{by_start:?}");
         assert!((gradient.by("g") + end / 20.0).abs() < 1e-9);
     }
-    // Counted from long ago, where the time has 22 bits behind the point.
+    // With a distant origin of time, so that the time has only 22 bits after the point.
     let ago = 1.7e9;
     let loss = Loss::at_end(|node: &tfe::Node<1>| (node.t - ago).powi(2));
     let found = run.gradient(start, ago..ago + 2.0, &loss);
@@ -263,7 +268,7 @@ fn losses_of_the_time_of_an_event_move_with_it() {
     let (_, gradient) = found.expect("a gradient");
     assert!((gradient.by_start().q[0] + 2.0).abs() < 1e-9);
     assert!(gradient.by("g").abs() < 1e-9);
-    // An end that does not move is not asked for elsewhere.
+    // An end that does not move is needed nowhere else.
     let loss = Loss::at_end(|node: &tfe::Node<1>| {
         assert_eq!(node.t, 0.4);
         node.q[0]
@@ -271,7 +276,7 @@ fn losses_of_the_time_of_an_event_move_with_it() {
     let found = run.gradient(start, 0.0..0.4, &loss);
     let (_, gradient) = found.expect("a gradient");
     assert!((gradient.by_start().q[0] - 1.0).abs() < 1e-9);
-    // What lies behind the end is not seen.
+    // Times after the end are ignored.
     let squares = |t: f64| run.gradient(start, 0.0..2.0, &Loss::squares("height", [t], [0.5]));
     squares(0.3).expect("before the end");
     let error = squares(1.9).expect_err("behind the end");
@@ -279,7 +284,8 @@ fn losses_of_the_time_of_an_event_move_with_it() {
     assert!(matches!(kind, RunErrorKind::Loss { .. }), "{kind}");
 }
 
-/// An impulse moves in an element whose end an event decides: that is told, and with a node there the derivatives are right.
+/// If an event decides where an element ends, an impulse inside the element moves relative to it: this is refused, and
+/// with a node at the impulse the derivatives are right.
 #[test]
 fn impulses_beside_events_are_at_nodes() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, event(wall) = x - 0.12)]
@@ -300,7 +306,7 @@ fn impulses_beside_events_are_at_nodes() {
     assert!((by_start.q[0] - 0.12).abs() < 1e-14);
 }
 
-/// Losses of micrometres are those of metres.
+/// Losses in micrometres are equivalent to those in metres.
 #[test]
 fn losses_of_small_numbers_have_their_gradients() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2)]
@@ -314,7 +320,8 @@ fn losses_of_small_numbers_have_their_gradients() {
         let q = gradient.by_start().q[0];
         assert!((q - expected).abs() < 1e-8 * expected.abs(), "{size}: {q}");
     }
-    // Squares vanish beside those of longer distances; a number beside a larger one vanishes within shorter ones.
+    // Squares of small distances vanish next to those of large ones, and a small number next to a larger one at shorter
+    // distances.
     for size in [1e-10, 1e-24, 1e-100] {
         let run = Simulation::new(&Free).step(0.1);
         let start = Free.state([size], [size]);

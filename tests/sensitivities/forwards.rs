@@ -1,8 +1,8 @@
-//! Derivatives along a run: parameters, starts, outputs, constraints.
+//! Forward derivatives along a run: by parameters and initial states, of outputs, with constraints.
 
 use super::*;
 
-/// Products of three masses are no numbers, the masses are.
+/// The product of three masses overflows or underflows, although the masses themselves do not.
 #[test]
 fn velocities_of_masses_of_any_size_have_their_derivatives() {
     #[dynamics(
@@ -48,7 +48,7 @@ fn parameters_are_numbered_as_they_stand() {
     assert_eq!(PENDULUMS.find_parameter("l[1]2"), None);
 }
 
-/// Every kind of element.
+/// All kinds of elements.
 #[test]
 fn derivatives_are_those_of_the_numbers_of_a_run() {
     let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
@@ -85,7 +85,7 @@ fn hamiltonians_have_derivatives() {
             |model| Simulation::new(model).element(element).step(0.1),
             true,
         );
-        // The output is one of the state alone.
+        // The output depends on the state only.
         let (last, state) = (s.by("b").last(), s.motion().last());
         let expected = last.q[0] * state.p[1] + state.q[0] * last.p[1]
             - last.q[1] * state.p[0]
@@ -101,7 +101,7 @@ fn hamiltonians_have_derivatives() {
     }
 }
 
-/// Velocities and outputs between the nodes of a run are not asked for; at nodes they are those of the state.
+/// The derivatives of velocities and outputs at nodes are functions of the state there.
 #[test]
 fn velocities_and_outputs_move_with_the_state() {
     let start = PENDULUMS.state([0.7, -0.4], [0.2, 0.5]);
@@ -148,7 +148,8 @@ fn velocities_and_outputs_move_with_the_state() {
     assert!(s.get("nothing").is_none() && s.by("g").output("nothing").is_none());
 }
 
-/// Parameters that are not in constraints: a run from another start is as good, so that differences know the derivative.
+/// Parameters that do not occur in constraints: the initial state stays admissible, so that differences give the
+/// derivative.
 #[test]
 fn constrained_motions_have_derivatives() {
     let start = ROD.state([0.6, -0.8], [0.4, 0.3]);
@@ -174,7 +175,7 @@ fn constrained_motions_have_derivatives() {
                 "{name}: {found} {expected}"
             );
         }
-        // Motions stay on the rod: x δx + y δy = 0.
+        // The derivatives are tangent to the constraint: x δx + y δy = 0.
         let node = s.motion().last();
         assert!((node.q[0] * last.q[0] + node.q[1] * last.q[1]).abs() < 1e-13);
     }
@@ -212,7 +213,8 @@ fn constrained_motions_have_derivatives() {
     }
 }
 
-/// By the length of the rod, with a start that moves along: q₀ = l (sin, −cos), p₀ = m l ω (cos, sin).
+/// The derivative by the length of the rod, with an initial state that depends on it: q₀ = l (sin, −cos), p₀ = m l ω
+/// (cos, sin).
 #[test]
 fn parameters_of_constraints_count() {
     fn at(l: f64) -> State<2> {
@@ -256,7 +258,7 @@ fn parameters_of_constraints_count() {
     ];
     for (s, expected) in both {
         let s = s.expect("derivatives");
-        // The start is proportional to l.
+        // The initial state is proportional to l.
         let (by, matrix) = (s.by("l").last(), s.by_start().last());
         let moved = [start.p[0], start.p[1], start.q[0], start.q[1]];
         let total = |row: usize| (0..4).map(|k| matrix[(row, k)] * moved[k]).sum::<f64>();

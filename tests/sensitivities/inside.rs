@@ -3,10 +3,10 @@
 use super::*;
 
 const SPAN: f64 = 1.0;
-/// Between nodes, within pieces of elements, and at nodes.
+/// Times between nodes, within pieces of elements, and at nodes.
 const TIMES: [f64; 6] = [0.013, 0.26, 0.5, 0.61, 0.777, 0.98];
 
-/// What a motion has at [`TIMES`], and its integral.
+/// The values of a motion at [`TIMES`], and its integral.
 fn seen<M, const N: usize>(
     simulation: &Simulation<'_, M, N>,
     model: &M,
@@ -25,7 +25,7 @@ where
     (at, *integral.last().expect("from the start"))
 }
 
-/// Of a function of one number: the derivatives of all that is seen, by differences.
+/// Derivatives of all these values by one number, by differences.
 fn differences<const N: usize>(
     of: impl Fn(f64) -> ([[Vec<f64>; 3]; TIMES.len()], f64),
     x: f64,
@@ -67,7 +67,7 @@ fn compare<const N: usize>(
     }
 }
 
-/// Derivatives between the nodes and gradients of an integral, beside differences of runs.
+/// Derivatives between the nodes and gradients of an integral, compared with differences of runs.
 #[track_caller]
 fn check_inside<M: Model<N> + Sync, const N: usize>(
     model: &M,
@@ -76,7 +76,7 @@ fn check_inside<M: Model<N> + Sync, const N: usize>(
     output: &str,
     by_start: bool,
 ) {
-    // The errors of differences, of velocities the largest.
+    // The errors of the differences; those of velocities are the largest.
     let allowed = 1e-9;
     let run = simulation(model);
     let s = run.run_sensitive(start, 0.0..SPAN).expect("derivatives");
@@ -205,7 +205,8 @@ fn of_hamiltonians() {
 
 #[test]
 fn of_constrained_motions() {
-    // Starts beside the constraint are none: neither moves the length, nor the start.
+    // Changes of the initial state violate the constraint, and so does a change of the length alone: these are left
+    // out.
     let start = ROD.state([0.6, -0.8], [0.4, 0.3]);
     let s = Simulation::new(&ROD).step(0.02);
     let s = s.run_sensitive(start, 0.0..SPAN).expect("derivatives");
@@ -233,7 +234,7 @@ fn of_constrained_motions() {
     }
 }
 
-/// Pieces whose ends move: where the ball bounces, between bounces and over them.
+/// Pieces whose ends move: at bounces of a ball, between bounces and across them.
 #[test]
 fn of_motions_with_events() {
     let ball = Ball {
@@ -245,7 +246,7 @@ fn of_motions_with_events() {
     check_inside(&ball, start, bouncing, "velocity", true);
 }
 
-/// At the time of an event, as beside it, the time stays: y = y₀ + v₀ t − g t²/2 up to there.
+/// At the time of an event, and close to it, derivatives are at fixed time: y = y₀ + v₀ t − g t²/2 up to there.
 #[test]
 fn at_the_time_of_an_event_it_stays() {
     let ball = Ball {
@@ -267,7 +268,7 @@ fn at_the_time_of_an_event_it_stays() {
             let by_start = s.by_start().at(t).expect("in the span");
             assert!((by_start.q_by_p()[(0, 0)] - t).abs() < 1e-12, "{by_start}");
         }
-        // Nodes are of the event, where the ball is on the floor.
+        // Nodes belong to the event, at which the ball stays on the floor.
         let nodes = s.motion().states();
         let node = nodes.iter().position(|node| node.t == t).expect("an event");
         let of_event = s.by("g").states()[node].q[0];
@@ -302,7 +303,7 @@ fn integrals_of_what_is_no_output_are_told() {
     assert!(matches!(infinite, RunErrorKind::Loss { .. }), "{infinite}");
 }
 
-/// Backwards and, with an event that never happens, forwards.
+/// Backwards in time, and forwards with an event that never happens.
 #[test]
 fn integrals_backwards_are_integrals_forwards() {
     #[track_caller]
@@ -334,7 +335,8 @@ fn integrals_backwards_are_integrals_forwards() {
     compare_ways(&Simulation::new(&ROD).step(0.02), start, "height");
 }
 
-/// At t = 1e9 differences of times are off by 6e-5 of a step of 0.001; derivatives of velocities are not.
+/// At t = 1e9, differences of times have errors of 6e-5 relative to a step of 0.001; derivatives of velocities must not
+/// be affected.
 #[test]
 fn far_from_zero_elements_are_as_long_as_their_steps() {
     let ball = Ball {
@@ -348,7 +350,7 @@ fn far_from_zero_elements_are_as_long_as_their_steps() {
     for pair in s.motion().states().windows(2) {
         let middle = pair[0].t + 0.5 * (pair[1].t - pair[0].t);
         let node = s.by("g").at(middle).expect("in the span");
-        // Both are polynomials of the same part of the element, of numbers below one.
+        // Both are polynomials at the same position in the element, of numbers below one.
         let off = (ball.m * node.v[0] - node.p[0]).abs();
         assert!(off < 1e-13, "{off:e} at {middle}");
     }

@@ -1,4 +1,4 @@
-//! Derivatives of motions by parameters and starts, against differences of runs.
+//! Derivatives of motions by parameters and initial states, compared with differences of runs.
 
 #[path = "../common/differences.rs"]
 mod differences;
@@ -31,7 +31,7 @@ fn end<M: Model<N> + Sync, const N: usize, const D: usize>(
     std::array::from_fn(|a| if a < N { last.q[a] } else { last.p[a - N] })
 }
 
-/// The gradient of a loss by all parameters and by the start, and the loss, as one row.
+/// The gradient of a loss by all parameters and by the initial state, and the loss, as one row.
 fn gradient_of<M: Model<N> + Sync, const N: usize>(
     simulation: &Simulation<'_, M, N>,
     start: State<N>,
@@ -48,7 +48,7 @@ fn gradient_of<M: Model<N> + Sync, const N: usize>(
     numbers.copied().collect()
 }
 
-/// Two such rows are the same but for roundings.
+/// Asserts that two such rows agree up to rounding errors.
 #[track_caller]
 fn compare_rows(found: &[f64], expected: &[f64], what: &str) {
     assert_eq!(found.len(), expected.len());
@@ -61,7 +61,8 @@ fn compare_rows(found: &[f64], expected: &[f64], what: &str) {
     }
 }
 
-/// Compares all derivatives of a run with differences; `allowed` is relative to the largest derivative by the same thing.
+/// Compares all derivatives of a run with differences; `allowed` is relative to the largest derivative by the same
+/// parameter.
 fn check<M: Model<N> + Sync, const N: usize, const D: usize>(
     model: &M,
     start: State<N>,
@@ -124,7 +125,8 @@ fn check<M: Model<N> + Sync, const N: usize, const D: usize>(
     s
 }
 
-/// Two pendulums with friction; the names of `sensitivity` have kernels of their own, the others are differentiated by dual numbers.
+/// Two pendulums with friction. The parameters in `sensitivity` have kernels of their own, the others are
+/// differentiated by dual numbers.
 #[dynamics(
     coordinates(theta[2]),
     let x1 = l[0]*sin(theta[0]), let y1 = -l[0]*cos(theta[0]),
@@ -152,7 +154,7 @@ const PENDULUMS: Pendulums = Pendulums {
     c: 0.1,
 };
 
-/// A Hamiltonian, in phase space and in velocities, whose time appears too.
+/// A Hamiltonian that also depends on time, in phase space and with velocities.
 #[dynamics(
     coordinates(x, y),
     hamiltonian = (px^2 + py^2)/(2*m) + k*(x^2 + y^2)/2 + b*(x^2*y - y^3/3) + a*x*cos(omega*t),
@@ -178,13 +180,13 @@ const DRIVEN: Driven = Driven {
     c: 0.05,
 };
 
-/// A start in phase space.
+/// An initial state in phase space.
 const PHASE: State<2> = State {
     q: [0.2, 0.3],
     p: [0.1, -0.2],
 };
 
-/// A pendulum on a rod, with the angle of its trajectory as a redundant constraint: the length is a parameter of constraints.
+/// A pendulum with a rod, and a redundant constraint; the length is a parameter of the constraints.
 #[dynamics(
     coordinates(x, y),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
@@ -218,7 +220,7 @@ struct Twice {
     l: f64,
 }
 
-/// A blade on a slope: a constraint of velocities whose direction turns.
+/// A blade on a slope: a constraint on velocities whose direction rotates.
 #[dynamics(
     coordinates(x, y, phi),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(phi)^2 + m*g*slope*x,
@@ -231,7 +233,7 @@ struct Blade {
     slope: f64,
 }
 
-/// A ball that bounces: by closed forms, and of the time of the bounce.
+/// A bouncing ball: closed forms, also for the time of the bounce.
 #[dynamics(
     coordinates(y),
     lagrangian = m/2*dot(y)^2 - m*g*y,

@@ -1,4 +1,5 @@
-//! Bodies by unit quaternions: their mass matrix is singular, and constraints leave the velocity of a momentum.
+//! Bodies described by unit quaternions: the mass matrix is singular, and constraints determine the velocity of a
+//! momentum.
 
 use crate::differences::difference;
 use tfe::prelude::*;
@@ -20,7 +21,7 @@ struct Top {
     mgd: f64,
 }
 
-/// The same with a velocity constraint that turns: no rate about the first axis but what time says.
+/// The same with a time-dependent velocity constraint: the rate about the first axis is prescribed.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -39,7 +40,7 @@ struct Steered {
     b: f64,
 }
 
-/// A unit quaternion and the rates that belong to body rates.
+/// A unit quaternion, and the rates for given body rates.
 fn start(w: [f64; 3]) -> ([f64; 4], [f64; 4]) {
     let e = [0.9_f64, 0.3, -0.2, 0.4];
     let length = e.iter().map(|e| e * e).sum::<f64>().sqrt();
@@ -55,7 +56,7 @@ fn start(w: [f64; 3]) -> ([f64; 4], [f64; 4]) {
 
 const SPAN: std::ops::Range<f64> = 0.0..1.0;
 
-/// What is looked at in a run: velocities at the end and inside, outputs, an integral.
+/// The compared values of a run: velocities at the end and inside, outputs, an integral.
 fn looks<M: tfe::Model<4>>(run: &Simulation<'_, M, 4>, model: &M, start: State<4>) -> [f64; 11] {
     let motion = run.run(start, SPAN).expect("a run");
     let (last, inside) = (motion.last().v, motion.at(0.513).expect("inside").v);
@@ -102,7 +103,7 @@ fn check<M: tfe::Model<4> + Copy + Send + Sync>(model: M, parameter: &str, start
             loss(Loss::integral("w1")),
         ];
         for (k, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
-            // Differences of eighth order keep some 1e-12.
+            // Differences of eighth order have errors of about 1e-12.
             let off = (found - wanted).abs();
             assert!(off < 1e-10, "{element}, {k}: {found} beside {wanted}");
         }

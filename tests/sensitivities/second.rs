@@ -1,4 +1,4 @@
-//! Second derivatives of losses, beside closed forms.
+//! Second derivatives of losses, compared with closed forms.
 
 use super::*;
 use crate::differences::difference_over;
@@ -18,7 +18,7 @@ fn place([m, k, c]: [f64; 3], t: f64) -> f64 {
     (-rate * t).exp() * ((omega * t).cos() + rate / omega * (omega * t).sin())
 }
 
-/// ∂²f/∂a∂b by differences of eighth order of closed forms, over a distance that leaves 1e-10.
+/// ∂²f/∂a∂b of closed forms by differences of eighth order, with a spacing that leads to errors of 1e-10.
 fn second(f: impl Fn([f64; 3]) -> f64, at: [f64; 3], (i, j): (usize, usize)) -> f64 {
     let moved = |x: f64, place: usize, mut at: [f64; 3]| {
         at[place] += x;
@@ -28,7 +28,7 @@ fn second(f: impl Fn([f64; 3]) -> f64, at: [f64; 3], (i, j): (usize, usize)) -> 
     derivative(&|x| derivative(&|y| f(moved(y, j, moved(x, i, at)))))
 }
 
-/// Beside the closed form, at a parameter that is zero and at one that is not.
+/// Compared with the closed form, at a parameter that is zero and at one that is not.
 #[test]
 fn second_derivatives_are_those_of_a_closed_form() {
     for c in [0.0, 0.2] {
@@ -59,7 +59,8 @@ fn second_derivatives_are_those_of_a_closed_form() {
     }
 }
 
-/// A drag that is next to zero has the second derivatives of none, or an estimate that says so.
+/// A drag close to zero has the second derivatives of no drag, or an estimated error that says that they are
+/// inaccurate.
 #[test]
 fn second_derivatives_by_parameters_next_to_zero() {
     let found = |c: f64| {
@@ -84,7 +85,7 @@ fn second_derivatives_by_parameters_next_to_zero() {
     }
 }
 
-/// Through bounces and with a loss over time.
+/// Across bounces, and with a loss that depends on time.
 #[test]
 fn second_derivatives_go_through_bounces() {
     let ball = Ball {
@@ -96,7 +97,8 @@ fn second_derivatives_go_through_bounces() {
     let hessian = bouncing(&ball)
         .hessian(ball.state([1.0], [0.0]), 0.0..1.5, &loss, ["g", "floor"])
         .expect("second derivatives");
-    // From rest at the height 1 over the floor z: τ = √(2(1 − z)/g), and at last y = z + 0.64 g τ s − g s²/2 with s = 1.5 − 2.6 τ.
+    // From rest at height 1 above the floor z: τ = √(2(1 − z)/g), and finally y = z + 0.64 g τ s − g s²/2 with s = 1.5
+    // − 2.6 τ.
     let y = |[g, z, _]: [f64; 3]| {
         let tau = (2.0 * (1.0 - z) / g).sqrt();
         let s = 1.5 - 2.6 * tau;
@@ -115,7 +117,7 @@ fn second_derivatives_go_through_bounces() {
     }
 }
 
-/// With a constraint that holds the parameter, and an integral: beside second differences of the loss.
+/// With a constraint that contains the parameter, and an integral: compared with second differences of the loss.
 #[test]
 fn second_derivatives_with_constraints_and_integrals() {
     let rod = |l: f64, g: f64| Rod {
@@ -138,7 +140,7 @@ fn second_derivatives_with_constraints_and_integrals() {
     let by_g = run
         .hessian(start, 0.0..1.0, &loss, ["g"])
         .expect("second derivatives");
-    // By l the start would leave the constraint: by g alone.
+    // With another l the initial state would violate the constraint: by g alone.
     let expected = second(value, [1.0, 9.81, 0.0], (1, 1));
     let found = by_g.by("g", "g");
     assert!((found - expected).abs() < 1e-8, "{found} {expected}");
@@ -184,7 +186,7 @@ fn what_cannot_be_differentiated_twice_is_told() {
     assert_eq!(*fixed.kind(), RunErrorKind::ParametersFixed);
 }
 
-/// Differences by a parameter of 1e-308 divide by what has no reciprocal.
+/// Differences by a parameter of 1e-308 divide by a number whose reciprocal overflows.
 #[test]
 fn second_derivatives_that_are_not_finite_are_refused() {
     let model = Oscillator {

@@ -1,4 +1,5 @@
-//! Constrained models: a body carried by a unit quaternion, whose mass matrix is singular, and a rod whose length is a parameter of its constraint.
+//! Models with constraints: a body described by a unit quaternion, whose mass matrix is singular, and a rod whose
+//! length is a parameter of its constraint.
 
 use super::*;
 use crate::duals::{array, moved, root};
@@ -12,7 +13,8 @@ fn legendre_slopes(c: f64) -> [f64; 3] {
     [1.0, 3.0 * x, (15.0 * x * x - 3.0) / 2.0]
 }
 
-/// The end of one constrained element: the equations (T-72), (T-73) and (T-80) as they stand, for holonomic rows.
+/// The end of one constrained element: the equations (T-72), (T-73) and (T-80) as in the theory, for holonomic
+/// constraints.
 fn constrained_end<M: Model<N>, const N: usize, const R: usize>(
     model: &M,
     element: Element,
@@ -45,7 +47,7 @@ fn constrained_end<M: Model<N>, const N: usize, const R: usize>(
         terms.fold(number(0.0), |sum, (row, mu)| sum + row[a] * *mu)
     };
     let span = number(h);
-    // What is made of the rates and multipliers of an element: the residual, and where it ends.
+    // From the rates and multipliers of an element: the residual, and the state at its end.
     let made = |x: &[Dual]| {
         let (rates, x) = x.split_at(s * N);
         let (multipliers, x) = x.split_at(s * R);
@@ -119,7 +121,7 @@ fn off_constrained<M: Model<N> + Sync, const N: usize, const R: usize>(
     off(&run, start, f64::from(steps) * h, &end)
 }
 
-/// A top about a fixed point, its attitude a unit quaternion.
+/// A top with a fixed point; its attitude is a unit quaternion.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -135,7 +137,7 @@ struct Top {
     c: f64,
 }
 
-/// Two rods one after the other: two constraints with parameters of their own.
+/// Two rods, the second hanging from the first: two constraints with parameters of their own.
 #[dynamics(
     coordinates(x, y, u, w),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2 + dot(u)^2 + dot(w)^2) - m*g*(y + w) - k*(u - x)^4/4,
@@ -181,7 +183,7 @@ fn derivatives_of_constrained_models_are_those_of_runs_in_dual_numbers() {
     ]
     .map(|twice| 0.5 * twice);
     let spinning = top.state(attitude, rate);
-    // Both rods turn about their upper ends: velocities at right angles to them.
+    // Both rods rotate about their upper ends: velocities are perpendicular to them.
     let hanging = rods.state(
         [0.6, -0.8, 0.6 + 0.5, -0.8 - 1.2],
         [0.8 * 0.5, 0.6 * 0.5, 0.4 - 1.2 * 0.7, 0.3 - 0.5 * 0.7],

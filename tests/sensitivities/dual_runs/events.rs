@@ -1,4 +1,5 @@
-//! Runs with events: the element is cut where the observable vanishes, and goes on from what the act has made of the state.
+//! Runs with events: the element ends where the observable vanishes, and the run continues with the state made by the
+//! act.
 
 use super::*;
 use crate::duals::{root, velocity};
@@ -19,7 +20,7 @@ struct Hitting {
     s: f64,
 }
 
-/// The wall, of the parameters as a kernel sees them.
+/// The position of the wall, from the parameters as a kernel receives them.
 fn distance(model: &Hitting, q: &[Dual], parameter: Option<usize>) -> Dual {
     let own = |name: &str, value: f64| {
         let asked = parameter.is_some() && parameter == model.find_parameter(name);
@@ -28,7 +29,7 @@ fn distance(model: &Hitting, q: &[Dual], parameter: Option<usize>) -> Dual {
     q[0] - own("w", model.w) - own("s", model.s) * q[1] * q[1]
 }
 
-/// What the wall does: a momentum, not linear in the velocity.
+/// The act at the wall: a momentum that depends nonlinearly on the velocity.
 fn pushed<R: tfe::runtime::Real>(v: R) -> R {
     R::from_f64(-1.6) * v - R::from_f64(0.1) * v * v
 }
