@@ -1,11 +1,11 @@
-//! Ensembles that go on where they have got to.
+//! Ensembles that continue from where they ended.
 
 use super::{DoublePendulum, Driven, HalfLine, Pendulum, Quartic, Rod, distance, fractions};
 use tfe::RunErrorKind;
 use tfe::ensemble::{EnsembleError, Members};
 use tfe::prelude::*;
 
-/// One run, and two that are cut anywhere, on the grid; all bits and all failures.
+/// One run compared with two parts, interrupted anywhere on the grid: all bits and all failures are the same.
 fn halves<'m, M, K, const N: usize>(
     ensemble: &Ensemble<'m, M, N, K>,
     starts: &[State<N>],
@@ -55,7 +55,7 @@ fn two_halves_are_one_run_to_the_bit() {
         let ensemble = Ensemble::new(&pendulum).element(element);
         halves(&ensemble, &swings, (30, 0.1), &mut seed);
     }
-    // Some lanes go their own way, some fail, some steps are cut.
+    // Some lanes leave the common iteration, some fail, some steps are cut.
     let quartic: Vec<_> = fractions(9)
         .map(|f| Quartic.state([60.0 * f], [0.0]))
         .collect();
@@ -69,7 +69,7 @@ fn two_halves_are_one_run_to_the_bit() {
         .map(|f| double.state([3.0 * f, 2.0], [0.0; 2]))
         .collect();
     halves(&Ensemble::new(&double), &wild, (20, 0.15), &mut seed);
-    // One after the other.
+    // One run after the other.
     let rod = Rod { g: 9.81 };
     let falls: Vec<_> = fractions(3)
         .map(|f| rod.state([1.0, 0.0], [0.0, f]))
@@ -80,7 +80,7 @@ fn two_halves_are_one_run_to_the_bit() {
     halves(&Ensemble::of_models(&models), &start, (20, 0.1), &mut seed);
 }
 
-/// A start beside the constraints is refused by the first element, also behind a span without any.
+/// An initial state that violates the constraints is refused by the first element, also after an empty span.
 #[test]
 fn starts_beside_constraints_are_refused_after_an_empty_span() {
     let rod = Rod { g: 9.81 };
@@ -100,7 +100,7 @@ fn starts_beside_constraints_are_refused_after_an_empty_span() {
     assert!(is_refused(error.kind()), "{error}");
 }
 
-/// Times beside the grid begin it anew; a bad end changes nothing.
+/// If the time is off the grid, a new grid begins; an invalid end changes nothing.
 #[test]
 fn ensembles_stop_where_they_are_told() {
     let starts: Vec<_> = fractions(5)
@@ -122,7 +122,8 @@ fn ensembles_stop_where_they_are_told() {
     for (a, b) in end.nodes().zip(whole.nodes()) {
         assert!(distance(a, b) < 1e-12);
     }
-    // Without a step of one's own the first span with a length tells it; a bad start is one failure.
+    // Without a given step size, the first span that is not empty determines it; an invalid initial state is one
+    // failure.
     let bad = [
         starts[0],
         State {

@@ -1,4 +1,4 @@
-//! Ensembles give what single runs give, for every start, whatever happens to the others.
+//! Ensembles give the same as single runs for every initial state, whatever happens to the others.
 
 mod going_on;
 #[path = "../common/largest.rs"]
@@ -52,21 +52,21 @@ struct Driven {
     c: f64,
 }
 
-/// Turns by the Hamiltonian's own mixed terms: neither separable nor with a constant mass.
+/// A Hamiltonian that rotates by mixed terms: neither separable nor with a constant mass.
 #[dynamics(
     coordinates(x, y), momenta(px, py),
     hamiltonian = (px^2 + py^2)*(1 + x^2/10)/2 + (x*py - y*px)*(1 + sin(t)/5) + (x^2 + y^2)/2 + x^4/8,
 )]
 struct Turning;
 
-/// Alone it is solved by Newton's method, in lanes by the fixed point.
+/// A single run solves it by Newton's method, lanes by fixed-point iteration.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k/2*x^2, dissipation = c/2*dot(x)^2)]
 struct Oscillator {
     k: f64,
     c: f64,
 }
 
-/// Has no force, and no motion, left of zero.
+/// There is no force, and no motion, for negative x.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^(3/2))]
 struct HalfLine;
 
@@ -78,7 +78,7 @@ struct Rod {
     g: f64,
 }
 
-/// From 0 to 1, `count` of them.
+/// `count` numbers from 0 to 1.
 fn fractions(count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| k as f64 / count as f64)
 }
@@ -92,7 +92,7 @@ fn distance<const N: usize>(a: &Node<N>, b: &Node<N>) -> f64 {
     worst / scale
 }
 
-/// An ensemble and single runs, over a span that is no whole number of steps.
+/// An ensemble compared with single runs, over a span that is not a whole number of steps.
 #[track_caller]
 fn agree<M, const N: usize>(model: &M, element: impl Into<Element> + Copy, starts: &[State<N>])
 where
@@ -111,7 +111,7 @@ where
         steps += motion.statistics().steps;
         let end = end.as_ref().expect("a regular motion");
         assert_eq!(end.t, 10.03);
-        // Rounding of two hundred steps, in motions that magnify it little.
+        // The rounding errors of two hundred steps, in motions that hardly amplify them.
         let error = distance(end, motion.last());
         assert!(error <= 1e-13, "{error:.1e} from {start:?}");
     }
@@ -130,7 +130,7 @@ fn ensembles_are_single_runs() {
         .collect();
     agree(&model, Mixed::<6>, &starts);
     agree(&model, Radau::<3>, &starts);
-    // Full quadrature has no lanes.
+    // Elements with full quadrature do not support lanes.
     agree(&model, Primal::<3>, &starts[..3]);
 
     let model = PendulumH {
@@ -179,7 +179,7 @@ struct Scaled {
     l: f64,
 }
 
-/// One motion in units of mass, length and time that are powers of two, which change no digit.
+/// The same motion in units of mass, length and time that are powers of two, which do not change any digit.
 #[test]
 fn units_of_all_sizes_are_alike() {
     let end = |[mass, length, time]: [i32; 3]| {
@@ -210,7 +210,7 @@ fn units_of_all_sizes_are_alike() {
         for (end, expected) in end(units).iter().zip(&expected) {
             for a in 0..2 {
                 let error = (end[a] - expected[a]).abs();
-                // Roundings of two hundred steps.
+                // The rounding errors of two hundred steps.
                 assert!(error <= 1e-13, "{units:?}: {error:.1e}");
             }
         }
@@ -227,7 +227,7 @@ fn one_failure_leaves_the_others() {
         .run(&starts, 0.0..2.0)
         .expect("a good plan");
     assert_eq!(alone.failures().count(), 0);
-    // One falls to where there is nothing, one begins nowhere.
+    // One motion reaches the singularity, and one starts outside the domain.
     starts[5] = HalfLine.state([1.0], [-5.0]);
     starts[9].q[0] = f64::INFINITY;
     let ends = Ensemble::new(&HalfLine)
@@ -268,7 +268,7 @@ fn one_failure_leaves_the_others() {
 
 #[test]
 fn a_stiff_start_goes_its_own_way() {
-    // Its frequency is proportional to the amplitude: at 60 the fixed point does not contract.
+    // Its frequency is proportional to the amplitude: at 60 the fixed-point iteration does not contract.
     let mut starts: Vec<_> = fractions(8)
         .map(|f| Quartic.state([1.0 + f], [0.0]))
         .collect();
@@ -285,10 +285,10 @@ fn a_stiff_start_goes_its_own_way() {
             end.as_ref().expect("Newton's method does it"),
             motion.last(),
         );
-        // Twenty steps, each of about three units of phase at the large amplitude.
+        // Twenty steps, each with a phase of about three radians at the large amplitude.
         assert!(error <= 1e-11, "{error:.1e} from {start:?}");
     }
-    // Where nothing but the fixed point is allowed, this start fails in its first element, and alone.
+    // If only fixed-point iteration is allowed, this run fails in its first element, and no other does.
     let ensemble = ensemble.solver(Solve::FixedPoint);
     let ends = ensemble.run(&starts, 0.0..1.0).expect("a good plan");
     let failed = matches!(ends[3], Err(RunErrorKind::Solve { element: 0, .. }));
@@ -350,7 +350,7 @@ fn spans_of_all_kinds() {
     let back = ensemble.run(&there, 1.0..0.0).expect("a good plan");
     assert_eq!(back.nodes().count(), starts.len());
     for (start, end) in starts.iter().zip(back.nodes()) {
-        // Time-reversible: only rounding of a hundred steps is left.
+        // The motion is reversible: only rounding errors of a hundred steps are left.
         assert!((start.q[0] - end.q[0]).abs() <= 1e-13 && end.p[0].abs() <= 1e-13);
     }
     let empty = ensemble
@@ -385,7 +385,8 @@ fn spans_of_all_kinds() {
     ));
 }
 
-/// What single runs would warn of, counted by kind: double pendulums in steps that are far too long, whose roots are trusted.
+/// The warnings that single runs would have, counted by kind: double pendulums with steps that are far too long, whose
+/// roots are accepted without checks.
 #[test]
 fn warnings_are_counted_by_kind() {
     let model = DoublePendulum { g: 9.81 };
@@ -408,7 +409,7 @@ fn warnings_are_counted_by_kind() {
     assert!(expected > 10 && expected < 40, "{expected}");
     let mut run = ensemble.begin(&starts, 0.0).expect("starts");
     assert_eq!(run.run_to(end).expect("runs").warnings(), found);
-    // At a step of a proper length there are none.
+    // With a proper step size there are none.
     let ends = ensemble.step(0.01).run(&starts, 0.0..end).expect("runs");
     assert!(ends.warnings().is_empty(), "{}", ends.warnings());
 }

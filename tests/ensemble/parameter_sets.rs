@@ -1,10 +1,11 @@
-//! Many models of one kind: what each gives alone, whoever runs beside it.
+//! Many models of one kind: each gives the same as alone, whatever runs in the other lanes.
 
 use super::{DoublePendulum, Driven, HenonHeiles, Pendulum, PendulumH, distance, fractions};
 use tfe::ensemble::EnsembleError;
 use tfe::prelude::*;
 
-/// Models side by side and single runs; what a model does depends by no bit on those beside it.
+/// Models in lanes compared with single runs; the result for a model does not depend by a single bit on those in the
+/// other lanes.
 fn models_agree<M, const N: usize>(
     models: &[M],
     element: impl Into<Element> + Copy,
@@ -29,7 +30,7 @@ fn models_agree<M, const N: usize>(
         let motion = simulation
             .run(start, span.clone())
             .expect("a regular motion");
-        // Rounding of a hundred steps, in motions that magnify it little.
+        // The rounding errors of a hundred steps, in motions that hardly amplify them.
         let error = distance(&end.expect("an end"), motion.last());
         assert!(error <= 1e-13, "{error:.1e}");
     }
@@ -40,7 +41,7 @@ fn parameter_sets() {
     let models: Vec<_> = fractions(19).map(|f| Driven { c: f }).collect();
     models_agree(&models, Mixed::<4>, models[0].state([1.0], [0.0]));
     models_agree(&models, Radau::<3>, models[0].state([1.0], [0.0]));
-    // A constant mass, another one in each lane.
+    // A constant mass, different in each lane.
     let models: Vec<_> = fractions(11)
         .map(|f| Pendulum {
             m: 0.1 + f,
@@ -71,7 +72,7 @@ fn parameter_sets() {
         .map(|f| DoublePendulum { g: 1.0 + f })
         .collect();
     models_agree(&models, Mixed::<6>, start);
-    // One after the other: full quadrature.
+    // One after the other, since elements with full quadrature do not support lanes.
     models_agree(&models[..5], Primal::<3>, start);
 
     let models: Vec<_> = fractions(7).map(|f| Driven { c: f }).collect();
@@ -95,7 +96,7 @@ struct Pushed {
     k: f64,
 }
 
-/// Each model is driven by its own function, whoever runs beside it.
+/// Each model is driven by its own function, whatever runs in the other lanes.
 #[test]
 fn inputs_are_those_of_each_model() {
     let plain: Vec<_> = fractions(11).map(|k| Pushed { k }).collect();
@@ -119,7 +120,8 @@ fn inputs_are_those_of_each_model() {
     models_agree(&table, Mixed::<4>, start);
 }
 
-/// Of models in lanes each that does not contract goes its own way, with its own parameters; one that fails stops no other.
+/// A model in a lane whose iteration does not contract is solved separately, with its own parameters; one that fails
+/// does not stop the others.
 #[test]
 fn some_parameter_sets_go_their_own_way() {
     let mut models: Vec<_> = fractions(13).map(|f| Driven { c: f }).collect();
@@ -142,7 +144,7 @@ fn some_parameter_sets_go_their_own_way() {
     }
 }
 
-/// Two springs, and a coupling that a whole number stands in.
+/// Two springs, and a coupling that contains an integer.
 #[dynamics(
     coordinates(q[2]),
     lagrangian = sum(i in 0..2, m/2*dot(q[i])^2 - k[i]/4*q[i]^4) + order*cos(q[0] - q[1]),
@@ -153,7 +155,7 @@ struct Springs {
     order: usize,
 }
 
-/// The numbers of a vector, and a whole number, are those of each model; where all have the same ones they go side by side.
+/// The numbers of a vector, and an integer, are those of each model; if they are equal for all, lanes are used.
 #[test]
 fn what_has_no_number_is_that_of_each_model() {
     let start = State {

@@ -1,4 +1,4 @@
-//! Inputs that are wrong, or fail.
+//! Invalid inputs, and functions that fail.
 
 use crate::DRIVING;
 use tfe::prelude::*;
@@ -38,7 +38,7 @@ fn misuse_is_told() {
         table(&[0.0, 0.0], &[1.0, 2.0]),
         "the table of input `u` is invalid: the times must increase"
     );
-    // Without a number there is no state, and an error says where and which input it was.
+    // Without a value of the input there is no state; the error says at which time and for which input.
     let nan = Simulation::new(&DRIVING)
         .step(0.1)
         .input("u", |t| if t < 0.5 { 0.0 } else { f64::NAN });
@@ -70,7 +70,8 @@ fn misuse_is_told() {
     assert!(kind.to_string().contains("set it with `step(h)`"), "{kind}");
 }
 
-/// A function that panics, or gives what is no number, ends a run with an error that says when; what was recorded before is kept.
+/// If a function panics or returns a number that is not finite, the run ends with an error that says when; what was
+/// recorded before is kept.
 #[test]
 fn functions_that_fail_are_told() {
     #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u, event(middle) = x)]
@@ -120,7 +121,7 @@ fn functions_that_fail_are_told() {
     );
     let mut steps = simulation.clone().input("u", at_once).steps(start, 1.0);
     assert!(steps.next().is_some_and(|step| step.is_err()) && steps.next().is_none());
-    // Step by step, with an accuracy, and where events are looked for.
+    // In single steps, with an accuracy, and while events are searched.
     let mut steps = simulation.clone().input("u", panics).steps(start, 0.0);
     let error = steps.find_map(Result::err).expect("it ends");
     assert!(is_panic(&error) && steps.next().is_none());
@@ -143,12 +144,13 @@ fn functions_that_fail_are_told() {
         .run(start, 0.0..5.0)
         .expect_err("a panic");
     assert!(is_panic(watched.kind()) && watched.partial().events().len() == 1);
-    // What failed once does not spoil another run.
+    // A failure does not affect the next run.
     let good = simulation.clone().input("u", nan).run(start, 0.0..1.9);
     assert_eq!(good.expect("before it fails").states().len(), 20);
 }
 
-/// A function that panics at the very start of a run that is to meet an accuracy, that is estimated, or that goes on, is told as in any other.
+/// If a function panics at the very start of a run with an accuracy, with an estimate, or of a continued run, the error
+/// is as in any other run.
 #[test]
 fn functions_that_panic_at_once_are_told() {
     #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u)]
@@ -172,7 +174,7 @@ fn functions_that_panic_at_once_are_told() {
     check(resumed.expect_err("a panic").kind());
 }
 
-/// Functions are asked within the span of a run and nowhere else, where they may be defined no more.
+/// Functions are called for times within the span of a run only; outside they may be undefined.
 #[test]
 fn functions_are_not_asked_beyond_the_span() {
     #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u)]

@@ -1,10 +1,10 @@
-//! Loops of control.
+//! Control loops.
 
 use crate::{DRIVING, w};
 use tfe::prelude::*;
 use tfe::{HeldNode, InputError, RunErrorKind};
 
-/// A loop of control gives what a table of the same values gives.
+/// A control loop gives the same as a table of the same values.
 #[test]
 fn a_loop_holds_what_was_set() {
     let start = DRIVING.state([0.3], [0.0]);
@@ -35,7 +35,7 @@ fn a_loop_holds_what_was_set() {
     assert!((motion.last().q[0] - run.node().q[0]).abs() < 1e-12);
 }
 
-/// Feedback with rates of their own: the same as setting the inputs by hand at these times.
+/// Feedback laws sampled at their own rates: the same as setting the inputs by hand at these times.
 #[test]
 fn feedback_is_sampled_with_its_own_rate() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u, w), force(x) = u + w)]
@@ -82,7 +82,7 @@ fn feedback_is_sampled_with_its_own_rate() {
     assert!(results.any(|one| one.is_err()) || told(between.advance()));
 }
 
-/// The outputs of a node at which an event stops the loop are those of this node.
+/// If an event stops the loop, the outputs of its last node are those at this node.
 #[test]
 fn outputs_of_a_loop_that_is_stopped_are_those_of_its_end() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u, event(wall) = 0.75 - x, output(place) = x)]
@@ -102,7 +102,7 @@ fn outputs_of_a_loop_that_is_stopped_are_those_of_its_end() {
     assert!(held.advance().is_err());
 }
 
-/// Late times have roundings that are much of a short period.
+/// At late times, rounding errors of the time are a considerable part of a short sampling time.
 #[test]
 fn feedback_is_sampled_at_late_times() {
     use std::sync::atomic::{AtomicU32, Ordering};
@@ -125,7 +125,7 @@ fn feedback_is_sampled_at_late_times() {
     assert_eq!(asked.load(Ordering::Relaxed), 20);
 }
 
-/// What is set may make an event at once: nothing is left of what was proved with the input before.
+/// Setting an input may cause an event at once: bounds derived with the previous input must not be used any more.
 #[test]
 fn events_of_what_is_held_are_met() {
     #[dynamics(
@@ -143,7 +143,7 @@ fn events_of_what_is_held_are_met() {
             .hold(Guarded.state([0.0], [speed]), 0.0)
             .expect("a loop")
     };
-    // On its way up, and on its way down, on which it comes below the limit within the step.
+    // On its way up, and on its way down, on which it falls below the limit within the step.
     for (speed, below) in [(0.5, 0.05), (-0.5, 0.05), (-0.5, 0.003)] {
         let mut run = hold(speed);
         run.set("limit", 2.0);
@@ -172,7 +172,8 @@ fn events_of_what_is_held_are_met() {
     assert!(run.advance().is_err());
 }
 
-/// The outputs of nodes at an event that sets a parameter are those of either side, with the inputs of their step.
+/// The outputs of the two nodes at an event that sets a parameter are those before and after it, with the inputs of
+/// their step.
 #[test]
 fn outputs_of_a_loop_are_those_of_each_node() {
     #[dynamics(
@@ -197,7 +198,7 @@ fn outputs_of_a_loop_are_those_of_each_node() {
         .hold(mass.state([0.0], [1.0]), 0.0)
         .expect("a loop");
     assert_eq!(run.node().output("gain"), Some(1.0));
-    // Nodes at 0.3, 0.6, two at 0.75, at 0.9 and 1.2; the input is set between those at 0.75.
+    // Nodes at 0.3, 0.6, twice at 0.75, at 0.9 and 1.2; the input is set between those at 0.75.
     let gains = [1.0, 1.0, 1.0, 2.0, 2.0, 2.0];
     let inputs = [0.0, 0.0, 0.0, 0.0, 0.0, 5.0];
     for (number, (gain, input)) in gains.into_iter().zip(inputs).enumerate() {

@@ -1,4 +1,4 @@
-//! Inputs: functions of the time, tables, loops of control.
+//! Inputs: functions of time, tables, control loops.
 
 mod failures;
 mod loops;
@@ -7,7 +7,7 @@ mod rates;
 use tfe::Driven;
 use tfe::prelude::*;
 
-/// A pendulum whose pivot is moved and whose axis is turned: inputs in the energy, in forces, in outputs.
+/// A pendulum with a moved pivot and a driven axis: inputs in the energy, in forces, and in outputs.
 #[dynamics(
     coordinates(theta),
     let vx = l*dot(theta)*cos(theta) + w,
@@ -44,7 +44,7 @@ struct Written {
     c: f64,
 }
 
-/// A Hamiltonian with an input in both of its halves.
+/// A Hamiltonian with an input in its kinetic and in its potential energy.
 #[dynamics(
     coordinates(x, y),
     momenta(px, py),
@@ -63,7 +63,7 @@ struct Kicked;
 )]
 struct KickedWritten;
 
-/// A bead on a sphere, pushed.
+/// A bead on a sphere with a driving force.
 #[dynamics(
     coordinates(r[3]),
     lagrangian = m/2*inner(dot(r), dot(r)) - m*g*r[2],
@@ -119,7 +119,7 @@ fn u(t: f64) -> f64 {
     0.1 * t.sin() * (-t / 10.0).exp()
 }
 
-/// A function given at run time is the same as one that is written in the declaration, in runs of every kind.
+/// A function given at run time gives the same as one written in the declaration, in all kinds of runs.
 #[test]
 fn an_input_is_what_a_formula_of_time_is() {
     let start = WRITTEN.state([1.0], [0.5]);
@@ -179,7 +179,7 @@ fn an_input_is_what_a_formula_of_time_is() {
     assert!(a.error_estimate() < 1e-9);
 }
 
-/// Points side by side in the registers of the processor, Newton's method, models declared by a Hamiltonian.
+/// With lanes of points, with Newton's method, and for Hamiltonians.
 #[test]
 fn inputs_of_hamiltonian_models_are_the_same() {
     let start = State {
@@ -227,7 +227,7 @@ fn inputs_push_models_with_constraints() {
     }
 }
 
-/// As a model the struct has all inputs zero, and so has a run in which some are not given.
+/// As a model, the struct has all inputs zero, and so has a run in which some inputs are not given.
 #[test]
 fn what_is_not_given_is_zero() {
     let start = DRIVING.state([1.0], [0.0]);
@@ -243,7 +243,7 @@ fn what_is_not_given_is_zero() {
     assert_eq!(plain.states(), zeros.states());
 }
 
-/// A driven model is a model: ensembles and orbits take it.
+/// A driven model is a model: ensembles and orbits accept it.
 #[test]
 fn driven_models_are_models() {
     let driven = Driven::new(&DRIVING)
@@ -264,7 +264,7 @@ fn driven_models_are_models() {
         let node = node.as_ref().unwrap();
         assert!((node.q[0] - alone.last().q[0]).abs() < 1e-12);
     }
-    // The answer to a drive of period 2π/3.
+    // The response to a drive of period 2π/3.
     let damped = Driving { c: 0.8, ..DRIVING };
     let turned = Driven::new(&damped)
         .input("u", |t| (3.0 * t).sin())
@@ -279,10 +279,10 @@ fn driven_models_are_models() {
     assert!((after.last().q[0] - node.q[0]).abs() < 1e-9);
 }
 
-/// Elements end at the times of a table: a spline of its own knots costs no order, and a jump no digits.
+/// Elements end at the times of a table: a spline does not reduce the order at its knots, nor a jump the accuracy.
 #[test]
 fn elements_end_at_the_times_of_a_table() {
-    // θ″ = u exactly where the pendulum has no weight.
+    // θ″ = u exactly, since the pendulum has no weight.
     let free = Driving {
         m: 1.0,
         l: 1.0,
@@ -308,7 +308,7 @@ fn elements_end_at_the_times_of_a_table() {
     assert!((v - (0.7 - 0.8 + 0.465)).abs() < 1e-14, "{v}");
     let (v, _) = run([1.0, -2.0, 0.5, 0.0], Interpolation::Linear);
     assert!((v - (-0.35 - 0.3 + 0.2325)).abs() < 1e-14, "{v}");
-    // A cubic on four points is itself: u = t³ up to 2.03, then kept.
+    // A cubic spline through four points of a cubic is exact: u = t³ up to 2.03, then constant.
     let (v, q) = run(times.map(|t| t.powi(3)), Interpolation::Spline);
     let (end, kept) = (times[3], times[3].powi(3));
     let rest = 3.0 - end;
@@ -317,7 +317,7 @@ fn elements_end_at_the_times_of_a_table() {
     assert!((q - exact).abs() < 1e-13);
 }
 
-/// Events see inputs.
+/// Events depend on inputs.
 #[test]
 fn events_of_inputs_are_met() {
     #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y, input(floor), event(hit) = y - floor)]
@@ -336,7 +336,7 @@ fn events_of_inputs_are_met() {
     assert!((motion.events()[0].t - exact).abs() < 1e-14);
 }
 
-/// Parameters of a driven model are set as those of any other, and its inputs stay.
+/// Parameters of a driven model are set as those of any other, and its inputs are kept.
 #[test]
 fn parameters_of_driven_models_are_set() {
     let start = DRIVING.state([1.0], [0.0]);
@@ -377,7 +377,7 @@ fn parameters_of_driven_models_are_set() {
     );
 }
 
-/// An input that jumps at the last node pushes up to there as before.
+/// An input that jumps at the last node acts as before up to there.
 #[test]
 fn given_nodes_may_end_at_a_jump() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u)]
@@ -393,7 +393,8 @@ fn given_nodes_may_end_at_a_jump() {
     assert!((speed - 1.0).abs() < 1e-12, "{speed}");
 }
 
-/// A run that goes on with another input begins with the velocity that belongs to its momentum then, p = m l (l θ̇ + w cos θ); with one that gives the same numbers it is the same run.
+/// A run continued with another input starts with the velocity that belongs to its momentum with that input, p = m l (l
+/// θ̇ + w cos θ); with an input of the same values the run is the same.
 #[test]
 fn runs_that_go_on_with_another_input_begin_with_its_velocity() {
     let run = Simulation::new(&DRIVING).step(0.1);
@@ -410,7 +411,7 @@ fn runs_that_go_on_with_another_input_begin_with_its_velocity() {
     let v = (node.p[0] / (m * l) - (w(0.5) + 0.2) * node.q[0].cos()) / l;
     assert!((node.v[0] - v).abs() < 1e-12, "{} for {v}", node.v[0]);
     assert_eq!(other.velocities()[0], node.v);
-    // The rest is the motion from there.
+    // The rest is the motion from that state.
     let anew = Simulation::new(&DRIVING).step(0.1);
     let anew = anew.input("w", |t| w(t) + 0.2);
     let anew = anew.run(*checkpoint.state(), 0.5..1.0).unwrap();

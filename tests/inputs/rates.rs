@@ -1,4 +1,4 @@
-//! Time derivatives of inputs: by them moves what a motion does where an event moves.
+//! Time derivatives of inputs: they affect the motion if the time of an event changes.
 
 use crate::{DRIVING, Driving, Kicked};
 use std::f64::consts::PI;
@@ -8,7 +8,8 @@ use tfe::runtime::{By, First, Model};
 
 const TIMES: [f64; 3] = [0.0, 1.0, 2.0];
 
-/// Within a difference of a time of a table the rate is that of the own piece: none of one that is held, not that of the jump.
+/// Close to a time of a table, the rate is that of the piece itself: zero for held values, and not the difference
+/// across the jump.
 #[test]
 fn rates_of_tables_are_those_of_their_pieces() {
     for (way, rates) in [
@@ -46,7 +47,7 @@ fn rates_of_tables_are_those_of_their_pieces() {
     }
 }
 
-/// So are those of functions of the time, whether they change in a second or in a microsecond, and at 1e9 s.
+/// The same for functions of time, whether they change within a second or a microsecond, and at 1e9 s.
 #[test]
 fn rates_of_functions_are_those_of_their_own_scale() {
     for (rate, t) in [(1.0, 0.3), (1.0, 1e9 + 0.5), (2e6 * PI, 3.2e-7)] {
@@ -75,8 +76,9 @@ fn rates_of_functions_are_those_of_their_own_scale() {
     }
 }
 
-/// θ″ = u from rest, kicked at a θ that is reached 10⁻⁷ before u jumps or bends, so that the jump is nearer than a difference is wide. With the speed v at that time t, in closed form: δt = −(δθ + t δp)/v,
-/// δθ(T) = δθ + T δp − δt, and δp stays.
+/// θ″ = u from rest, with an impulse at a value of θ that is reached 10⁻⁷ before u jumps or has a kink, so that the
+/// jump is closer than the spacing of a difference. With the speed v at that time t, in closed form: δt = −(δθ + t
+/// δp)/v, δθ(T) = δθ + T δp − δt, and δp does not change.
 #[test]
 fn matrices_across_events_near_the_times_of_a_table() {
     let free = Driving {
@@ -131,10 +133,10 @@ fn matrices_across_events_near_the_times_of_a_table() {
     }
 }
 
-/// The same of a model whose derivatives by the time are dual numbers, beside differences of runs.
+/// The same for a model whose time derivatives are dual numbers, compared with differences of runs.
 #[test]
 fn matrices_beside_runs_where_a_table_jumps_soon_after_an_event() {
-    /// By which the event moves less than it is before the jump.
+    /// The distance in time between the event and the jump; the event moves by less than this.
     const DISTANCE: f64 = 8e-7;
 
     let start = State {
@@ -158,7 +160,7 @@ fn matrices_beside_runs_where_a_table_jumps_soon_after_an_event() {
     let [event] = early.events() else {
         panic!("{:?}", early.events());
     };
-    // Nearer than a difference by the time is wide.
+    // Closer than the spacing of a difference in time.
     let run = run(event.t + 5e-6);
     let product = run
         .run_linearised(start, 0.0..0.9)
@@ -180,7 +182,7 @@ fn matrices_beside_runs_where_a_table_jumps_soon_after_an_event() {
         for row in 0..4 {
             let expected = (high[row] - low[row]) / (2.0 * DISTANCE);
             let found = product[(row, column)];
-            // Roundings of runs, of which the differences are made.
+            // The rounding errors of runs, divided by the spacing of the differences.
             assert!(
                 (found - expected).abs() < 1e-6,
                 "({row}, {column}): {found} for {expected}"

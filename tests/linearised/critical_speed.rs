@@ -18,8 +18,8 @@ const STEPS: [f64; 6] = [0.01, 0.03, 0.1, 0.3, 1.0, 3.0];
 
 /// The only speed between ½ Ω_c and 2 Ω_c at which the stability of an element changes.
 ///
-/// The double eigenvalue there is defective and known to half of the digits only, but the root is found of a smooth function of the
-/// matrix, ∏ (μᵢ − μⱼ)² with μ = λ + 1/λ, which has a simple zero.
+/// The double eigenvalue there is defective and known to half of the digits only. The root is found for a smooth
+/// function of the matrix, ∏ (μᵢ − μⱼ)² with μ = λ + 1/λ, which has a simple zero.
 #[track_caller]
 fn limit_speed(element: Element, h: f64) -> f64 {
     let critical = TOP.critical_speed();
@@ -58,7 +58,7 @@ fn the_limit_of_primal_elements_depends_on_the_step() {
         let two = 1.0 + sigma / 12.0;
         let three = two * (1.0 + sigma / 60.0) / (1.0 + sigma / 10.0);
         for (nodes, ratio) in [(2, two), (3, three)] {
-            // At h = 3 two nodes want more than twice Ω_c², still inside the range.
+            // At h = 3 two nodes need more than twice Ω_c², still inside the range.
             let (found, expected) = (
                 limit_speed(Element::primal(nodes), h),
                 critical * ratio.sqrt(),
@@ -85,7 +85,8 @@ fn nothing_breaks_at_the_critical_speed() {
                     a.iter().all(|entry| entry.is_finite()),
                     "{element}, h = {h}"
                 );
-                // A double eigenvalue in one Jordan block is known to the square root of round-off, 1.5e-8, in units of the block's size.
+                // A double eigenvalue in one Jordan block is known to the square root of the rounding unit, 1.5e-8, in
+                // units of the size of the block.
                 let radius = stability::spectral_radius(&a);
                 assert!(
                     (radius - 1.0).abs() <= 2e-7,
@@ -94,7 +95,7 @@ fn nothing_breaks_at_the_critical_speed() {
                 );
             }
         }
-        // Above Ω_c by (T-87), (T-88) the primal limit: unstable at Ω_c, but finite.
+        // The limit of primal elements is above Ω_c by (T-87), (T-88): unstable at Ω_c, but finite.
         let radius = stability::spectral_radius(&top.transition(Element::primal(nodes), 1.0));
         assert!(
             radius.is_finite() && radius > 1.0,
@@ -103,7 +104,8 @@ fn nothing_breaks_at_the_critical_speed() {
     }
 }
 
-/// J_t = 1, J_a = 2, mgd = 1 with steps of 6: four nodes have a narrow band of instability within the stable speeds, wherever the search begins.
+/// J_t = 1, J_a = 2, mgd = 1 with steps of 6: four nodes have a narrow interval of instability within the stable
+/// speeds, which must be found wherever the search begins.
 #[test]
 fn a_narrow_band_is_found_from_far_away() {
     let matrix = |omega: f64| {
@@ -128,7 +130,8 @@ fn a_narrow_band_is_found_from_far_away() {
     }
 }
 
-/// From far below, through poles of the element: one limit, at its closed form. At h = 2 the matrix with two mixed nodes has a pole at Ω = 0.
+/// A search from far below, across poles of the element, finds the one limit at its closed form. At h = 2 the matrix
+/// with two mixed nodes has a pole at Ω = 0.
 #[test]
 fn one_limit_from_far_below() {
     for (element, limit) in [

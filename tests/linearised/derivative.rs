@@ -1,10 +1,12 @@
-//! The transition matrix is the derivative of the step: every element, both declarations, on a nonlinear, damped and driven model.
+//! The transition matrix is the derivative of the step: for every element, as Lagrangian and Hamiltonian, on a
+//! nonlinear, damped and driven model.
 
 use nalgebra::DMatrix;
 use std::ops::Range;
 use tfe::prelude::*;
 
-/// A mass that depends on the position, a gyroscopic coupling, a potential and a force that depend on time, damping that is not linear.
+/// A mass that depends on the position, a gyroscopic coupling, a time-dependent potential and force, and nonlinear
+/// damping.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (1 + x^2/4)*dot(x)^2/2 + dot(y)^2/2 + x*y*dot(y)/3 - x^4/4 - cos(y)*(1 + sin(t)/5) - x*y/3,
@@ -15,7 +17,7 @@ struct ByLagrangian {
     c: f64,
 }
 
-/// The same: p_x = (1 + x²/4) ẋ, p_y = ẏ + xy/3.
+/// The same as a Hamiltonian: p_x = (1 + x²/4) ẋ, p_y = ẏ + xy/3.
 #[dynamics(
     coordinates(x, y), momenta(px, py),
     hamiltonian = px^2/(2*(1 + x^2/4)) + (py - x*y/3)^2/2 + x^4/4 + cos(y)*(1 + sin(t)/5) + x*y/3,
@@ -41,7 +43,8 @@ fn elements(nodes: usize) -> Vec<Element> {
     ]
 }
 
-/// The derivative of the end of a run by its start, in the order (p, q): central differences, extrapolated once,
+/// The derivative of the end of a run by its initial state, in the order (p, q), by central differences with one
+/// extrapolation,
 ///
 /// ```text
 /// D(δ) = (f(y + δ) − f(y − δ)) / 2δ ,      f′ = (4 D(δ/2) − D(δ)) / 3 + O(δ⁴) .
@@ -80,14 +83,15 @@ pub(crate) fn difference<M: Model<2>>(
 fn check<M: Model<2>>(model: &M, start: State<2>, declared_by: &str) {
     for nodes in 2..=5 {
         for element in elements(nodes) {
-            // Forward and backward.
+            // Forwards and backwards in time.
             for h in [0.3, -0.2] {
                 let a = stability::transition_matrix(model, element, &start, 0.7, h)
                     .unwrap_or_else(|error| panic!("{element} by {declared_by}: {error}"));
                 let simulation = Simulation::new(model).element(element).step(h);
                 let expected = difference(&simulation, start, 0.7..0.7 + h);
                 let error = (a - expected).amax();
-                // Truncation: δ⁴/480 times fifth derivatives of order 10; round-off: 1e-16/δ, times a few. Together 1e-12.
+                // The truncation error is δ⁴/480 times fifth derivatives of order 10, the rounding error a few times
+                // 1e-16/δ; together 1e-12.
                 assert!(
                     error <= 1e-11,
                     "{element} by {declared_by}, h = {h}: {error:.1e}"

@@ -1,5 +1,5 @@
-//! Transition matrices: of linear models against closed forms, of nonlinear ones against differences of runs, along motions, and the steps
-//! at which a method grows although the model does not.
+//! Transition matrices: those of linear models compared with closed forms, of nonlinear ones with differences of runs,
+//! along motions; and the steps at which a method is unstable although the model is not.
 
 #![allow(missing_docs)] // what models and helpers mean is said where they are
 

@@ -1,9 +1,11 @@
-//! Stiff modes in nonlinear models: within a bubble of the primal element the motion grows, the mixed element of as many nodes keeps it bounded.
+//! Stiff modes in nonlinear models: within an unstable interval (bubble) of the primal element the motion grows,
+//! whereas it remains bounded with the mixed element of as many nodes.
 
 use tfe::prelude::*;
 use tfe::stability::unstable_intervals;
 
-/// Three stiff springs of frequency ω in a row, coupled by soft quartic ones: a_i is where a spring is, b_i its extension (scaled by √½ both).
+/// Three stiff springs of frequency ω in a row, coupled by soft quartic ones: a_i is the position of a spring, b_i its
+/// extension (both scaled by √½).
 #[dynamics(
     coordinates(a[3], b[3]),
     lagrangian = sum(i in 0..3, (dot(a[i])^2 + dot(b[i])^2)/2 - omega^2/2*b[i]^2)
@@ -15,10 +17,11 @@ struct Chain {
 
 const CHAIN: Chain = Chain { omega: 50.0 };
 
-/// The fast part of a step ωh for three nodes: within √10 … √12.
+/// The phase ωh of the stiff modes in one step, for three nodes: within √10 … √12.
 const IN_THE_BUBBLE: f64 = 3.3;
 
-/// A mass on a spring that swings: r from the suspension, θ from the downward vertical, mass and natural length one.
+/// A mass on a spring that swings: r from the suspension, θ from the downward vertical; mass and natural length are
+/// one.
 #[dynamics(
     coordinates(r, theta),
     lagrangian = (dot(r)^2 + r^2*dot(theta)^2)/2 + g*r*cos(theta) - k/2*(r - 1)^2,
@@ -28,10 +31,10 @@ struct ElasticPendulum {
     k: f64,
 }
 
-/// g/k is a power of two, so that the rest is one to the last bit.
+/// g/k is a power of two, so that the equilibrium is exact to the last bit.
 const PENDULUM: ElasticPendulum = ElasticPendulum { g: 1.0, k: 2048.0 };
 
-/// The largest energy error of a run: infinite if it failed.
+/// The largest energy error of a run; infinite if it failed.
 fn energy_error<M: Model<N>, const N: usize>(
     model: &M,
     element: Element,
@@ -41,7 +44,7 @@ fn energy_error<M: Model<N>, const N: usize>(
     let motion = Simulation::new(model)
         .element(element)
         .step(h)
-        // The element as it is: else steps over which the energy jumps are cut.
+        // The element as it is: otherwise, steps in which the energy jumps would be cut.
         .solver(Solve::Trusting)
         .run(start, 0.0..200.0 * h);
     motion.map_or(f64::INFINITY, |motion| motion.energy_error())
@@ -49,17 +52,18 @@ fn energy_error<M: Model<N>, const N: usize>(
 
 #[test]
 fn the_chain_at_rest_is_unstable_in_the_bubble_of_its_springs() {
-    // Without the quartic part, three equal oscillators and three free masses.
+    // Without the quartic part there are three equal oscillators and three free masses.
     let rest = CHAIN.state([0.0; 6], [0.0; 6]);
     let far = 5.0 / CHAIN.omega;
     let found = unstable_intervals(&CHAIN, Primal::<3>, &rest, 0.0..far).expect("smooth");
     assert_eq!(found.len(), 1, "{found:#?}");
     let (start, end) = (found[0].start * CHAIN.omega, found[0].end * CHAIN.omega);
-    // Three oscillators cross at once: det(A + 1) has triple zeros there. Multiples of one matrix, they are known as well as simple ones.
+    // Three equal oscillators become unstable at once: det(A + 1) has triple zeros there. Since they are those of
+    // multiples of one matrix, they are known as accurately as simple ones.
     assert!((start - 10.0_f64.sqrt()).abs() < 1e-10 && (end - 12.0_f64.sqrt()).abs() < 1e-10);
-    // stability_bubbles.json
+    // The reference is from stability_bubbles.json.
     assert!((found[0].radius - 1.129817690854696).abs() < 1e-12);
-    // The free masses have double eigenvalues, which round-off splits: no interval of its own.
+    // The free masses have double eigenvalues, which rounding errors split: this must not be reported as an interval.
     let none = unstable_intervals(&CHAIN, Mixed::<3>, &rest, 0.0..far).expect("smooth");
     assert!(none.is_empty(), "{none:?}");
 }
@@ -83,7 +87,7 @@ fn the_chain_grows_in_the_bubble_and_not_with_mixed() {
 
 #[test]
 fn the_elastic_pendulum_hanging_has_the_bubble_of_its_spring() {
-    // r = 1 + g/k at rest; the spring oscillates at √k, the pendulum at √(g/r).
+    // r = 1 + g/k in equilibrium; the spring oscillates at √k, the pendulum at √(g/r).
     let rest = PENDULUM.state([1.0 + PENDULUM.g / PENDULUM.k, 0.0], [0.0; 2]);
     let omega = PENDULUM.k.sqrt();
     let found =

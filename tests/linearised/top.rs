@@ -1,4 +1,4 @@
-//! The upright spinning top, linearised: section 13 of the theory, every row of the table.
+//! The linearised upright spinning top: section 13 of the theory, all rows of the table.
 
 use crate::common::{count, list, matrix, number, reference, word};
 use nalgebra::DMatrix;
@@ -24,7 +24,7 @@ pub struct Top {
 }
 
 impl Top {
-    /// Ω_c = (2/J_a) √(mgd J_t): the exact top is stable above it.
+    /// Ω_c = (2/J_a) √(mgd J_t): the exact top is stable above.
     pub fn critical_speed(&self) -> f64 {
         2.0 / self.ja * (self.mgd * self.jt).sqrt()
     }
@@ -79,14 +79,15 @@ fn every_matrix_and_radius_of_the_table() {
         let what = format!("{element}, {top:?}, h = {h}");
         let actual = top.transition(element, h);
         let expected = real_form(&matrix(&row["A_re"]), &matrix(&row["A_im"]));
-        // Relative to the largest entry: the small ones are differences that nearly cancel (a₁₂ vanishes at Ω_c, where both
-        // the centrifugal and the gravitational part of the stiffness are large).
+        // Relative to the largest entry: the small entries are differences with cancellation (a₁₂ vanishes at Ω_c,
+        // where both the centrifugal and the gravitational part of the stiffness are large).
         let error = (&actual - &expected).amax() / expected.amax();
         assert!(
             error <= 1e-12,
             "{what}: error {error:.1e}\n{actual}{expected}"
         );
-        // At 1 % from Ω_c two eigenvalues are 0.1 apart in phase or modulus: they lose one digit, where defective ones would lose eight.
+        // At 1 % from Ω_c two eigenvalues are 0.1 apart in phase or modulus: they lose one digit, whereas defective
+        // ones would lose eight.
         let (radius, exact) = (
             stability::spectral_radius(&actual),
             number(&row["spectral_radius"]),

@@ -1,4 +1,4 @@
-//! What a run says about a step at which the method grows.
+//! The warnings of a run whose steps make the method unstable.
 
 use tfe::prelude::*;
 use tfe::{Rule, RunError, Warning};
@@ -11,7 +11,7 @@ struct Oscillator {
 
 const UNIT: Oscillator = Oscillator { k: 1.0, c: 0.0 };
 
-/// What a run of a hundred steps from x = 1 says.
+/// The warnings of a run of a hundred steps from x = 1.
 fn warnings(model: &Oscillator, element: impl Into<Element>, h: f64) -> Vec<Warning> {
     let motion = Simulation::new(model)
         .element(element)
@@ -23,7 +23,7 @@ fn warnings(model: &Oscillator, element: impl Into<Element>, h: f64) -> Vec<Warn
 
 #[test]
 fn the_oscillator_in_the_bubble() {
-    // stability_bubbles.json: √10 < ρ < √12, the worst at 3.3112897574651194.
+    // From stability_bubbles.json: √10 < ρ < √12, with the largest radius at 3.3112897574651194.
     let worst = 3.3112897574651194;
     let found = warnings(&UNIT, Primal::<3>, worst);
     let [
@@ -39,7 +39,7 @@ fn the_oscillator_in_the_bubble() {
         panic!("{found:?}")
     };
     assert_eq!((time, element, exact), (0.0, Element::primal(3), 1.0));
-    // The span is a hundred steps to round-off.
+    // The span is a hundred steps up to rounding.
     assert!((step - worst).abs() < 1e-14);
     assert!((radius - 1.129817690854696).abs() < 1e-12, "{radius}");
     for rho in [3.163, 3.464, 7.75, 20.0] {
@@ -52,7 +52,7 @@ fn the_oscillator_in_the_bubble() {
 
 #[test]
 fn other_elements_have_other_bubbles_or_none() {
-    // Two Lobatto points are Störmer–Verlet: stable below 2. Two nodes: √12. Four: 3.1425 … √10.
+    // Two Lobatto points are the Störmer–Verlet method, stable below 2; two nodes: √12; four nodes: 3.1425 … √10.
     for (element, stable, unstable) in [
         (Element::primal(2).lobatto(), 1.99, 2.01),
         (Element::primal(2), 3.46, 3.47),
@@ -103,7 +103,7 @@ fn backwards_in_time_too() {
     };
     assert!(step < 0.0 && radius > 1.1);
     assert_eq!(run(&UNIT, 3.0), []);
-    // What is damped forwards grows backwards: that is the model's, and no warning.
+    // What is damped forwards in time grows backwards: this is a property of the model, and there is no warning.
     let damped = Oscillator { k: 1.0, c: 0.2 };
     for h in [0.1, 1.0, 2.0] {
         assert_eq!(run(&damped, h), [], "h = {h}");
@@ -167,13 +167,13 @@ fn the_stiff_mode_of_the_elastic_pendulum() {
     assert_eq!(run(Element::mixed(3), 3.3).warnings(), []);
 }
 
-/// A spring that hardens: H = ½p² + ½q² + ¼q⁴, ω² = 1 + 3q² of the linearised motion.
+/// A hardening spring: H = ½p² + ½q² + ¼q⁴, ω² = 1 + 3q² for the linearised motion.
 #[dynamics(coordinates(q), momenta(p), hamiltonian = p^2/2 + q^2/2 + q^4/4)]
 struct Hardening {}
 
 #[test]
 fn several_in_a_row_are_one_warning() {
-    // A stiffness that grows from k = 1 by 10⁻³ an element: ρ² = 6.25 k passes 10 … 12 between elements 600 and 920.
+    // The stiffness grows from k = 1 by 10⁻³ per element: ρ² = 6.25 k passes 10 … 12 between elements 600 and 920.
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - (1 + t/2500)*x^2/2)]
     struct Stiffening {}
     let model = Stiffening {};
@@ -186,9 +186,10 @@ fn several_in_a_row_are_one_warning() {
             .expect("a rest");
         motion.warnings().to_vec()
     };
-    // From element 0 it is looked at numbers 512, 1024 and 2048, before and after.
+    // If checks begin at element 0, they are made at elements 512, 1024 and 2048, before and after the interval.
     assert_eq!(run(0.0..7000.0), []);
-    // From number 620 on all of 0, 1, 2, …, 128 more are inside, and the last is near the middle.
+    // If they begin at element 620, those after 0, 1, 2, …, 128 further elements are inside, and the last is close to
+    // the middle.
     let found = run(1550.0..2000.0);
     let [
         Warning::UnstableStep {
@@ -199,13 +200,13 @@ fn several_in_a_row_are_one_warning() {
         panic!("{found:?}")
     };
     assert_eq!((time, step), (1550.0, 2.5));
-    // 1.1298 in the middle, 1.06 at the first.
+    // 1.1298 in the middle, 1.06 at the first check.
     assert!(radius > 1.125 && radius < 1.1299, "{radius}");
 }
 
 #[test]
 fn apart_from_each_other_they_are_several() {
-    // ρ² = 10.9 in elements 0 and 1 and from 16 on, 6.25 in between.
+    // ρ² = 10.9 in elements 0 and 1 and from 16 on, and 6.25 in between.
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - select(t < 4, 1.75, select(t < 35, 1, 1.75))*x^2/2)]
     struct Switched {}
     let model = Switched {};
@@ -227,13 +228,13 @@ fn apart_from_each_other_they_are_several() {
 
 #[test]
 fn a_failed_run_says_what_was_noticed() {
-    // The hardening spring is stable at rest (ρ = 3) and in a bubble or beyond at larger amplitudes.
+    // The hardening spring is stable at rest (ρ = 3), and in an unstable interval or beyond at larger amplitudes.
     let model = Hardening {};
     let run = Simulation::new(&model)
         .element(Primal::<3>)
         .step(3.3)
         .max_iterations(8)
-        // Else steps that fail are cut, and the run ends well.
+        // Otherwise steps that fail would be cut, and the run would end well.
         .solver(Solve::Trusting)
         .run(
             State {

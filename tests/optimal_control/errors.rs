@@ -1,8 +1,8 @@
-//! Problems that make no sense, and searches that fail.
+//! Invalid problems, and searches that fail.
 
 use super::*;
 
-/// Two masses, one of which is not pushed.
+/// Two masses; no force acts on one of them.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2,
@@ -101,7 +101,7 @@ fn what_makes_no_sense_is_an_error() {
         kind(sled().guess(|_| ([f64::NAN], [f64::NAN]))),
         Kind::Legendre(_)
     ));
-    // Its derivative by the force vanishes where the cart stands.
+    // Its derivative by the force vanishes while the cart stands.
     let power = swing_up().end_cost("power").solve();
     assert_eq!(
         power.expect_err("an input at the end").kind(),
@@ -135,7 +135,7 @@ fn searches_that_fail_keep_what_they_have() {
     assert!(partial.history().len() == 3 && partial.cost() > 0.0);
     assert_eq!(partial.motion().states().len(), 41);
 
-    // The second mass cannot get there.
+    // The second mass cannot reach the end.
     let pair = |target: f64, cost: &str| {
         OptimalControl::of(&Pair)
             .elements(4)

@@ -1,4 +1,4 @@
-//! Inputs of least cost.
+//! Optimal control: inputs with the lowest cost.
 
 mod errors;
 mod minima;
@@ -10,7 +10,8 @@ use tfe::prelude::*;
 use tfe::runtime::Controlled;
 use tfe::{InputError, MeshError};
 
-/// A pole on a cart, hanging at θ = 0 (Kelly, *An introduction to trajectory optimization*, SIAM Review 59 (2017), section 6).
+/// A pole on a cart, hanging at θ = 0 (M. Kelly, *An introduction to trajectory optimization*, SIAM Review 59 (2017),
+/// section 6).
 #[dynamics(
     coordinates(x, theta),
     lagrangian = (cart + m)/2*dot(x)^2 + m*l*dot(x)*dot(theta)*cos(theta) + m*l^2/2*dot(theta)^2 + m*g*l*cos(theta),
@@ -44,7 +45,8 @@ fn swing_up<'m>() -> OptimalControl<'m, CartPole, 2> {
         .running_cost("effort")
 }
 
-/// An arm of two equal links on a table, torques at the shoulder and at the elbow; θ₂ relative to the first link.
+/// An arm of two equal links on a horizontal plane, with torques at the shoulder and the elbow; θ₂ is relative to the
+/// first link.
 #[dynamics(
     coordinates(theta1, theta2),
     let x1 = cos(theta1)/2,
@@ -76,7 +78,7 @@ fn reach<'m>() -> OptimalControl<'m, Arm, 2> {
         .running_cost("effort")
 }
 
-/// A spacecraft in the plane, in polar coordinates and units of its first orbit, with a thrust along the radius and one across.
+/// A spacecraft in the plane, in polar coordinates and units of its first orbit, with radial and tangential thrust.
 #[dynamics(
     coordinates(r, phi),
     momenta(pr, pphi),
@@ -91,7 +93,7 @@ fn reach<'m>() -> OptimalControl<'m, Arm, 2> {
 )]
 struct Spacecraft;
 
-/// The same by its Lagrangian.
+/// The same as a Lagrangian.
 #[dynamics(
     coordinates(r, phi),
     lagrangian = (dot(r)^2 + r^2*dot(phi)^2)/2 + 1/r,
@@ -103,7 +105,8 @@ struct Spacecraft;
 )]
 struct Spaceship;
 
-/// From a circle to one of half as much radius again, in a time of one and a half revolutions on the first; where on it is free.
+/// From a circular orbit to one with a radius half as large again, in the time of one and a half revolutions on the
+/// first; the position on the second is free.
 fn transfer<M: Controlled<2>>(model: &M) -> OptimalControl<'_, M, 2> {
     let circle = |r: f64| (r.sqrt(), r.powf(-1.5));
     let (start, end) = (circle(1.0), circle(1.5));
@@ -124,7 +127,7 @@ fn transfer<M: Controlled<2>>(model: &M) -> OptimalControl<'_, M, 2> {
         .running_cost("effort")
 }
 
-/// Costs with E, 2 E, and many elements: the first two errors beside the cost.
+/// The costs with E and 2 E elements and with many: the errors of the first two, and the cost.
 fn errors<'m, M: Controlled<2> + 'm>(
     problem: impl Fn() -> OptimalControl<'m, M, 2>,
     elements: usize,
@@ -146,7 +149,7 @@ fn errors<'m, M: Controlled<2> + 'm>(
 fn costs_are_those_of_finer_elements() {
     let (swing, [coarse, fine]) = errors(swing_up, 40, 160);
     assert!(coarse < 1e-6, "{coarse:e}");
-    // Order 6: 64 times.
+    // Order 6: halving the elements reduces the error by a factor of 64.
     assert!(
         (40.0..110.0).contains(&(coarse / fine)),
         "{coarse:e} {fine:e}"
@@ -157,7 +160,7 @@ fn costs_are_those_of_finer_elements() {
     assert!(coarse < 1e-6 && fine < 1e-7, "{coarse:e} {fine:e}");
     let (by_lagrangian, _) = errors(|| transfer(&Spaceship), 20, 80);
     assert!((by_lagrangian / space - 1.0).abs() < 1e-11);
-    // As they were found first: nothing published has these digits.
+    // Values from the first computation; there are no published values with these digits.
     for (cost, known) in [
         (swing, 58.807667461),
         (arm, 5.960635913),
@@ -187,7 +190,7 @@ fn work_is_energy_and_impulse_is_momentum_all_along() {
             "{node}: {gained} {}",
             work[node]
         );
-        // The gravity has no horizontal part: the force alone changes the momentum, to the last digits.
+        // Gravity has no horizontal component: only the force changes the momentum, up to rounding.
         assert!((state.p[0] - impulse[node]).abs() < 1e-12, "{node}");
     }
 
@@ -217,7 +220,7 @@ fn work_is_energy_and_impulse_is_momentum_all_along() {
     }
 }
 
-/// What was found is a motion of the model: a run with these inputs, by steps and without any knowledge of the search.
+/// The optimum is a motion of the model: a run with these inputs, by steps and independent of the search.
 #[test]
 fn an_optimum_is_a_run() {
     let best = swing_up().elements(50).solve().expect("a minimum");
@@ -263,7 +266,7 @@ fn an_optimum_is_a_run() {
     assert!((a.q[1] - b.q[1]).abs() < 1e-11 && (a.p[0] - b.p[0]).abs() < 1e-11);
 }
 
-/// The multipliers are derivatives of the least cost.
+/// The multipliers are the derivatives of the lowest cost.
 #[test]
 fn multipliers_are_what_states_are_worth() {
     let best = swing_up().elements(30).solve().expect("a minimum");
@@ -274,7 +277,7 @@ fn multipliers_are_what_states_are_worth() {
             CART.state([0.0, 0.0], [0.0, 0.0]),
             CART.state([1.0, PI], [0.0, 0.0]),
         );
-        // A shift of the state at the end is as good as the opposite one of what is asked for there.
+        // A shift of the state at the end is equivalent to the opposite shift of the state required there.
         let (state, sign) = if at_end {
             (&mut end, -1.0)
         } else {
@@ -312,7 +315,7 @@ fn multipliers_are_what_states_are_worth() {
     }
 }
 
-/// Units make no difference, of masses, lengths or times: the cost has those of a force squared, times a time.
+/// Units of mass, length and time do not matter: the cost has the unit of a force squared, times a time.
 #[test]
 fn sizes_do_not_matter() {
     let plain = swing_up().elements(20).solve().expect("an optimum");
@@ -343,7 +346,7 @@ fn sizes_do_not_matter() {
     }
 }
 
-/// A mass that is pushed.
+/// A mass with a force.
 #[dynamics(
     coordinates(x),
     lagrangian = dot(x)^2/2,
@@ -374,11 +377,11 @@ fn ends_are_given_free_or_cost_something() {
         2,
         "a quadratic problem, and the look that it is solved"
     );
-    // The worth of a state at the end is the derivative of what the end costs.
+    // The multiplier of the state at the end is the derivative of the cost of the end.
     assert!((best.multipliers()[3].q[0] - 8.0 * 3.0 / 7.0).abs() < 1e-11);
     assert!(best.multipliers()[3].p[0].abs() < 1e-12);
 
-    // A start that is free is taken where it costs nothing: x = 1 + ½ (t − …), here v = 1 all along.
+    // A free initial state is where it costs nothing: here v = 1 throughout.
     let best = OptimalControl::of(&Sled)
         .elements(2)
         .start(Component::Coordinate(0), 0.0)
@@ -389,7 +392,8 @@ fn ends_are_given_free_or_cost_something() {
         .expect("a minimum");
     assert!(best.cost().abs() < 1e-20 && (best.motion().states()[0].p[0] - 1.0).abs() < 1e-12);
 
-    // The cost of the end by its velocity: ∫ u² + ½ v₁², from v = 1: u = −v₁/2 all along, v₁ = 2/3, cost 1/9 + 2/9.
+    // The end costs by its velocity: ∫ u² + ½ v₁² from v = 1 gives u = −v₁/2 throughout, v₁ = 2/3, and the cost 1/9 +
+    // 2/9.
     let best = OptimalControl::of(&Sled)
         .elements(2)
         .from(Sled.state([0.0], [1.0]))
@@ -398,7 +402,7 @@ fn ends_are_given_free_or_cost_something() {
         .end_cost("energy")
         .solve()
         .expect("a minimum");
-    // ½ v₁² has the derivative v₁ = −2 u: u = −v₁/2, v₁ = 1 − v₁/2.
+    // ½ v₁² has the derivative v₁ = −2 u, thus u = −v₁/2 and v₁ = 1 − v₁/2.
     assert!((best.cost() - 1.0 / 3.0).abs() < 1e-12, "{}", best.cost());
 }
 
@@ -463,7 +467,7 @@ fn graded_meshes_and_guesses_are_taken() {
     assert_eq!(best.motion().states().len(), 41);
 }
 
-/// The end of the span is a node, where 0.2 + (0.9 − 0.2) is below it.
+/// The end of the span is a node, although 0.2 + (0.9 − 0.2) is less than it in floating-point arithmetic.
 #[test]
 fn motions_end_where_they_were_asked_to() {
     let best = OptimalControl::of(&Sled)

@@ -1,8 +1,8 @@
-//! Stationary points that are minima, and those that are none.
+//! Stationary points that are minima, and others that are not.
 
 use super::*;
 
-/// A pendulum with a torque, hanging at θ = 0, where its depth costs most.
+/// A pendulum with a torque, hanging at θ = 0, where the cost of its depth is highest.
 #[dynamics(
     coordinates(theta),
     lagrangian = dot(theta)^2/2 + cos(theta),
@@ -16,7 +16,7 @@ struct Pendulum {
     weight: f64,
 }
 
-/// From hanging at rest, without a torque to begin with: by symmetry all is stationary there.
+/// From hanging at rest, with the torque zero as the first guess: by symmetry this is a stationary point.
 fn hanging(pendulum: &Pendulum) -> OptimalControl<'_, Pendulum, 1> {
     OptimalControl::of(pendulum)
         .elements(20)
@@ -27,7 +27,8 @@ fn hanging(pendulum: &Pendulum) -> OptimalControl<'_, Pendulum, 1> {
 
 #[test]
 fn stationary_points_that_are_no_minima_are_left() {
-    // The least ∫ u² dt that brings a pendulum about rest to θ after a time T is θ² over ∫ sin² = T/2 − sin(2T)/4, and w θ²/2 is gained.
+    // The smallest ∫ u² dt that brings a pendulum from rest to θ within the time T is θ² divided by ∫ sin² = T/2 −
+    // sin(2T)/4, and w θ²/2 is gained.
     let critical = 2.0 / (1.0 - 4.0_f64.sin() / 4.0);
     let best = |weight: f64| {
         let pendulum = Pendulum { weight };
@@ -37,7 +38,8 @@ fn stationary_points_that_are_no_minima_are_left() {
     let rest = best(0.95 * critical);
     assert!((rest.cost() - 1.9 * critical).abs() < 1e-12);
     assert!(rest.motion().last().q[0].abs() < 1e-12);
-    // Other digits: Runge-Kutta's method in place of the elements, all equations in one matrix.
+    // Reference values computed independently: by a Runge–Kutta method instead of elements, with all equations in one
+    // matrix.
     for (weight, known) in [
         (1.02 * critical, 3.428752),
         (1.1 * critical, 3.654510),
@@ -50,12 +52,12 @@ fn stationary_points_that_are_no_minima_are_left() {
             swung.cost()
         );
         assert!(swung.cost() < 2.0 * weight && swung.motion().last().q[0].abs() > 0.3);
-        // The point that was left is in the history.
+        // The stationary point that was left is in the history.
         let first = swung.history()[0];
         assert!((first.cost - 2.0 * weight).abs() < 1e-12 && first.correction < 1e-10);
     }
 
-    // The other way round: what is left is symmetric, and the minimum is one of two.
+    // In the opposite case the point that is left is symmetric, and the minimum is one of two.
     let pendulum = Pendulum { weight: 5.0 };
     let other = hanging(&pendulum)
         .end_cost("depth")
@@ -78,7 +80,7 @@ fn stationary_points_between_given_ends_are_left() {
             .solve();
         best.unwrap_or_else(|error| panic!("{weight}: {error}"))
     };
-    // Too little is gained on the way there and back: 2 w over the whole time.
+    // Too little is gained on the way there and back: at most 2 w over the whole time.
     assert!((best(1.0).cost() - 8.0).abs() < 1e-12);
     let swung = best(5.0);
     assert!(
@@ -111,7 +113,7 @@ fn costs_that_fall_without_end_are_told() {
     let partial = error.partial().expect("what was done");
     assert!(partial.cost() == 0.0 && partial.history().len() == 1);
 
-    // Here the torque costs more than it brings (1/(1 − sin(4)/4) = 0.84), but the velocity at the start is free.
+    // Here the torque costs more than it gains (1/(1 − sin(4)/4) = 0.84), but the velocity at the start is free.
     let pendulum = Pendulum { weight: 0.5 };
     let error = OptimalControl::of(&pendulum)
         .elements(20)

@@ -1,14 +1,15 @@
-//! The unstable intervals of step size, the "bubbles" of Figure 1: ends by root finding against the roots of (T-57) to 20 digits.
+//! The unstable intervals of the step size, the "bubbles" of Figure 1: ends by root finding compared with the roots of
+//! (T-57) to 20 digits.
 
 use crate::Oscillator;
 use crate::common::{assert_close, count, list, number, reference, word};
 use tfe::prelude::*;
 use tfe::stability::{UnstableInterval, unstable_intervals};
 
-/// Twice the last limit of five nodes.
+/// Twice the last stability limit of five nodes.
 const FAR: f64 = 40.0;
 
-/// The promise of the table.
+/// The accuracy of the table.
 const ENDS: f64 = 1e-10;
 
 #[track_caller]
@@ -48,7 +49,7 @@ fn bubbles_of_the_primal_element() {
                     (interval.radius - radius).abs() <= 1e-12,
                     "{what}: {interval:?}, expected radius {radius}"
                 );
-                // A maximum is flat: its place is known to the square root of round-off.
+                // At a maximum, the position is known to the square root of the rounding unit only.
                 assert!(
                     (interval.worst * omega - worst).abs() <= 1e-7 * worst,
                     "{what}: {interval:?}, expected the worst at {worst}"
@@ -104,7 +105,7 @@ fn polynomial(text: &str, rho: f64) -> f64 {
 
 #[test]
 fn nothing_is_lost_where_the_interior_block_is_singular() {
-    // (T-25): ρ² = 10 for three nodes, 10 and 42 for four. All are ends of bubbles, where a₁₁ = ±1.
+    // (T-25): ρ² = 10 for three nodes, 10 and 42 for four. All of them are ends of bubbles, where a₁₁ = ±1.
     let table = reference("stability_bubbles");
     for (nodes, square, end) in [(3, 10.0_f64, -1.0), (4, 10.0, -1.0), (4, 42.0, 1.0)] {
         let case = list(&table["cases"])
@@ -120,7 +121,7 @@ fn nothing_is_lost_where_the_interior_block_is_singular() {
         assert!((a11 - end).abs() < 1e-13, "{nodes} nodes: {a11}");
         let oscillator = Oscillator::scaled(rho, 0.0, 1.0);
         let a = oscillator.transition(Element::primal(nodes), 1.0);
-        // Some roundings of entries of the size of ρ² = 42.
+        // Some rounding errors of entries of the size ρ² = 42.
         for diagonal in [a[(0, 0)], a[(1, 1)]] {
             assert!(
                 (diagonal - a11).abs() < 1e-13,
@@ -153,7 +154,7 @@ fn mixed_elements_have_no_bubbles() {
     }
 }
 
-/// Two equal masses between walls by springs k, c, k: ω² = k/m and (k + 2c)/m.
+/// Two equal masses between walls, with springs k, c, k: ω² = k/m and (k + 2c)/m.
 #[dynamics(coordinates(a, b),
     lagrangian = m/2*(dot(a)^2 + dot(b)^2) - k/2*(a^2 + b^2) - c/2*(b - a)^2)]
 struct Masses {
@@ -164,7 +165,7 @@ struct Masses {
 
 #[test]
 fn every_mode_has_its_bubbles() {
-    // ω = 1 and 1.3: the bubbles of the modes lie apart until the slow one is past its last limit.
+    // ω = 1 and 1.3: the bubbles of the two modes do not overlap until the slow one is past its last limit.
     let (fast, far) = (1.3_f64, 6.4);
     let masses = Masses {
         m: 1.0,
@@ -198,7 +199,7 @@ fn every_mode_has_its_bubbles() {
     }
 }
 
-/// At zero there is no element, and what vanishes there is not looked for.
+/// At zero step size there is no element; zeros there are not reported.
 #[test]
 fn steps_of_both_signs() {
     let oscillator = Oscillator {

@@ -23,7 +23,7 @@ fn step(
 
 #[test]
 fn mixed_and_reduced_primal_elements_conserve_the_energy() {
-    // (49), and (54): the invariant's stiffness is k itself.
+    // (49), and (54): the stiffness of the invariant is k itself.
     for nodes in 2..=6 {
         for element in [Element::mixed(nodes), Element::primal(nodes).reduced()] {
             for rho in RHOS {
@@ -64,7 +64,7 @@ fn energy_coefficients_of_the_two_node_primal_element() {
 
 #[test]
 fn the_primal_elements_keep_an_energy_of_changed_stiffness() {
-    // (52), (53) for two nodes; theory.md for three and four. Definite where the element is stable.
+    // (52), (53) for two nodes; theory.md for three and four. Positive definite where the element is stable.
     type Stiffness = fn(f64) -> f64;
     let cases: [(usize, Stiffness); 3] = [
         (2, |r| 1.0 - r / 12.0),

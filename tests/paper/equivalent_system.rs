@@ -15,7 +15,7 @@ fn equivalent(oscillator: &Oscillator, element: Element, h: f64) -> DMatrix<f64>
     derivative / (60.0 * d) * inverse
 }
 
-/// Truncation 0.02⁶ ~ 6e-11 times derivatives of order one, round-off 1e-16/0.02.
+/// The truncation error is 0.02⁶ ~ 6e-11 times derivatives of order one, the rounding error 1e-16/0.02.
 const TOLERANCE: f64 = 1e-8;
 
 const CASES: [(f64, f64); 4] = [(0.3, 1.0), (1.0, 1.0), (1.0, 2.5), (2.0, 0.7)];

@@ -1,5 +1,5 @@
-//! Every number of the paper (Borri, Bottasso, Mantegazza 1992) that concerns one element, from macro-declared models. Where the printed
-//! number is wrong, the corrected one of `docs/theory.md`.
+//! All numbers of the paper (Borri, Bottasso, Mantegazza 1992) that concern one element, from models declared with the
+//! macro. Where a printed number is wrong, the corrected one of `docs/theory.md` is used.
 
 #![allow(missing_docs)] // what models and helpers mean is said where they are
 

@@ -1,4 +1,5 @@
-//! One step of the pendulum and its derivative, for every form and rule of the table, from L and from H.
+//! One step of the pendulum and its derivative, for all forms and quadrature rules of the table, as Lagrangian and
+//! Hamiltonian.
 
 use crate::common::{
     assert_close, assert_matrix, count, list, matrix, number, numbers, reference, word,
@@ -67,7 +68,7 @@ fn every_form_and_rule() {
         ];
         for (by, (y1, a)) in declared {
             let what = format!("{element} ({form}, {rule}) declared by {by}");
-            // A hundred roundings of numbers of size one.
+            // A hundred rounding errors of numbers of size one.
             assert_close(&y1, &numbers(&case["y1"]), 2e-14, &what);
             assert_matrix(&a, &matrix(&case["A"]), 2e-14, &what);
             let determinant = number(&case["det_A_minus_1"]);

@@ -1,4 +1,4 @@
-//! Orders of approximation and of convergence, Tables I to III, measured from the elements.
+//! Orders of approximation and of convergence, Tables I to III, measured with the elements.
 
 use crate::common::{count, list, reference, word};
 use crate::{Oscillator, element};
@@ -23,8 +23,8 @@ fn evolution(oscillator: &Oscillator, h: f64) -> DMatrix<f64> {
     ) * decay
 }
 
-/// The power of h with which the error begins: the slope between neighbouring steps, with the influence of the next power (`gap` higher) removed by
-/// comparing two slopes. At `from` the error is well above round-off.
+/// The leading power of h of the error: the slope between successive step sizes, after eliminating the next power
+/// (`gap` higher) by comparing two slopes. At `from` the error is well above rounding.
 fn leading_power(error: impl Fn(f64) -> f64, from: f64, gap: i32) -> i32 {
     const RATIO: f64 = 1.25;
     let slope = |h: f64| (error(RATIO * h).abs() / error(h).abs()).ln() / RATIO.ln();
@@ -49,7 +49,8 @@ fn tables_one_to_three_and_on_to_six_nodes() {
             count(&row["n"]),
         );
         let damped = word(&row["damping"]) == "damped";
-        // Leading coefficients are Chebyshev polynomials U_m(ξ) about m = 2s + 1; these ξ stay away from their zeros.
+        // Leading coefficients are Chebyshev polynomials U_m(ξ) with m about 2s + 1; these ξ are not close to their
+        // zeros.
         let xi = [0.3, 0.2, 0.15, 0.12, 0.1][nodes - 2];
         let c = if damped { 2.0 * xi } else { 0.0 };
         let oscillator = Oscillator { m: 1.0, c, k: 1.0 };
@@ -57,7 +58,7 @@ fn tables_one_to_three_and_on_to_six_nodes() {
             oscillator.transition(element(form, quadrature, nodes), h) - evolution(&oscillator, h)
         };
         let what = format!("{form} {quadrature}, {nodes} nodes, damped: {damped}");
-        // Errors are about (h/4n)^power: larger elements are measured at larger steps.
+        // Errors are about (h/4n)^power: elements with more nodes are measured with larger steps.
         let from = [0.04, 0.12, 0.25, 0.35, 0.5][nodes - 2];
         let gap = if damped { 1 } else { 2 };
         let kappa = [0, 1].map(|i| leading_power(|h| difference(h).row(i).norm(), from, gap) - 1);
@@ -70,7 +71,7 @@ fn tables_one_to_three_and_on_to_six_nodes() {
         );
         seen += 1;
         if damped {
-            // Single entries change their sign between these steps and round-off.
+            // Single entries change their sign between these steps and rounding.
             continue;
         }
         for (i, row) in list(&row["err"]).iter().enumerate() {

@@ -16,7 +16,7 @@ const CASES: [(f64, f64); 8] = [
     (2.0, 1.5),
 ];
 
-/// Round-off of a 2 × 2 solve: a few units in the last place of entries of size up to 10.
+/// The rounding errors of solving a 2 × 2 system: a few units in the last place of entries up to 10.
 const TOLERANCE: f64 = 1e-13;
 
 #[test]
@@ -93,13 +93,13 @@ fn transition_matrices_for_two_to_six_nodes() {
 
 #[test]
 fn nothing_breaks_where_the_interior_block_is_singular() {
-    // Three nodes: ρ² = 10; four nodes: ρ² = 10 and 42. The step itself is finite there.
+    // Three nodes: ρ² = 10; four nodes: ρ² = 10 and 42. The step itself is regular there.
     for (nodes, rho_squared) in [(3, 10.0), (4, 10.0), (4, 42.0_f64)] {
         let at =
             |rho: f64| Oscillator::scaled(rho, 0.0, 1.0).transition(Element::primal(nodes), 1.0);
         let rho = rho_squared.sqrt();
         let (here, beside) = (at(rho), at(rho * (1.0 + 1e-9)));
-        // The derivative of the entries by ρ is below 100 there.
+        // The derivatives of the entries by ρ are below 100 there.
         assert_matrix(
             &here,
             &beside,

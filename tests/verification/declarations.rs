@@ -4,7 +4,7 @@ use crate::common::assert_close;
 use crate::models::DoublePendulum;
 use tfe::prelude::*;
 
-/// The double pendulum's Lagrangian expanded by hand.
+/// The Lagrangian of the double pendulum, expanded by hand.
 #[dynamics(
     coordinates(theta1, theta2),
     lagrangian = (m1 + m2)/2*l1^2*dot(theta1)^2 + m2/2*l2^2*dot(theta2)^2
@@ -87,7 +87,7 @@ fn three_declarations_of_the_double_pendulum_move_alike() {
         ];
         for (other, by) in others.into_iter().zip(["expanded L", "H"]) {
             let (oq, op, oe) = other.expect("the same motion");
-            // Fifty steps of roundings, amplified by less than 10 over one second; momenta are of size 10.
+            // The rounding errors of fifty steps, amplified by less than 10 over one second; momenta are of size 10.
             assert_close(&oq, &q, 2e-13, &format!("{element}: q, {by}"));
             assert_close(&op, &p, 2e-12, &format!("{element}: p, {by}"));
             assert_close(&oe, &energy, 2e-12, &format!("{element}: energy, {by}"));
@@ -95,8 +95,8 @@ fn three_declarations_of_the_double_pendulum_move_alike() {
     }
 }
 
-/// Forces depend on velocities in L and on momenta in H: Q_p = Q_v H_pp and Q_q|p = Q_q + Q_v H_pq must be right for Newton to converge and
-/// for the transition matrix to be the derivative.
+/// Forces depend on velocities in L and on momenta in H: Q_p = Q_v H_pp and Q_q|p = Q_q + Q_v H_pq must be right for
+/// Newton's method to converge, and for the transition matrix to be the derivative.
 #[dynamics(coordinates(x), lagrangian = (1 + x^2)*dot(x)^2/2 - x^4/4, force(x) = -c*dot(x)^3 + x*dot(x)/5)]
 struct DampedL {
     c: f64,

@@ -1,12 +1,12 @@
-//! Programs of users: serial arms in space.
+//! Source code of user programs: serial robot arms in space.
 
 use std::fmt::Write as _;
 
-/// `main.rs` with an arm of so many links, of none with a pendulum.
+/// The text of `main.rs` with an arm of a number of links; with zero links, with a pendulum.
 ///
-/// Each link is a slender rod of length `l[i]` with mass `m[i]`. Its joint turns about the axis c of the link before (the first, third, …)
-/// or about its axis b, so that neighbouring axes are perpendicular. Nine `let`s a link: the two axes that the joint turns, and the
-/// centre of mass.
+/// Each link is a slender rod of length `l[i]` with mass `m[i]`. Its joint turns about the axis c of the previous link
+/// (the first, third, …) or about its axis b, so that neighbouring joint axes are perpendicular. Each link has nine
+/// `let`s: the two axes that the joint rotates, and the centre of mass.
 ///
 /// ```text
 /// L = Σ m/2 |dp/dt|² + m l²/24 |da/dt|² − m g p_z       p: centre of mass, a: the axis of the rod

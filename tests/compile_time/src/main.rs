@@ -1,4 +1,4 @@
-//! Processor seconds that the compiler spends on the crate of a user whose model is a serial arm in space.
+//! The processor time that the compiler needs for the crate of a user whose model is a serial robot arm in space.
 //!
 //! The crate depends on `tfe` by its path and has the default profiles of Cargo, so that the engine runs unoptimised in `dev`, as it
 //! does for users. Dependencies are built once; then only the crate itself is compiled anew, for one number of links after the other:
@@ -19,7 +19,7 @@ mod user;
 use std::error::Error;
 use user::{Profile, User};
 
-/// The numbers of links where none are given.
+/// The numbers of links if none are given.
 const LINKS: [usize; 10] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12];
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -1,4 +1,4 @@
-//! The crate of a user, and how long the compiler takes for it.
+//! The crate of a user, and the time that the compiler needs for it.
 
 use std::error::Error;
 use std::fmt;
@@ -9,11 +9,11 @@ use std::process::{Command, Stdio};
 /// A profile of Cargo with its default settings.
 #[derive(Clone, Copy, Debug)]
 pub enum Profile {
-    /// Of `cargo build`.
+    /// The profile of `cargo build`.
     Dev,
-    /// Of `cargo build --release`.
+    /// The profile of `cargo build --release`.
     Release,
-    /// Of `cargo build`, with the two lines of the README in the manifest: the engine is optimised.
+    /// The profile of `cargo build` with the two lines of the README in the manifest, by which the engine is optimised.
     Tuned,
 }
 
@@ -27,12 +27,12 @@ impl fmt::Display for Profile {
     }
 }
 
-/// How a compilation ended.
+/// The result of a compilation.
 #[derive(Clone, Copy, Debug)]
 pub enum Outcome {
-    /// In so many processor seconds.
+    /// It took this many processor seconds.
     Seconds(f64),
-    /// The compiler was ended by a signal, as when its stack overflows, or found a mistake.
+    /// The compiler was ended by a signal, as when its stack overflows, or reported an error.
     Failed,
 }
 
@@ -45,7 +45,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// A crate outside of the workspace with `tfe` as its only dependency.
+/// A crate outside the workspace with `tfe` as its only dependency.
 #[derive(Debug)]
 pub struct User {
     folder: PathBuf,
@@ -56,7 +56,7 @@ impl User {
     /// Makes the crate and builds its dependencies.
     ///
     /// # Errors
-    /// Where a file cannot be written, or the dependencies cannot be built.
+    /// If a file cannot be written, or the dependencies cannot be built.
     pub fn new(profile: Profile) -> Result<Self, Box<dyn Error>> {
         let tests = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let root = tests.join("..").canonicalize()?;
@@ -70,7 +70,7 @@ impl User {
             "[package]\nname = \"user\"\nedition = \"2024\"\n\n[workspace]\n\n[dependencies]\ntfe = {{ path = {root:?} }}\n{lines}"
         );
         fs::write(folder.join("Cargo.toml"), manifest)?;
-        // The versions that the other crate outside of the workspace has.
+        // The versions used by the other crate outside the workspace.
         let versions = fs::read_to_string(tests.join("outside/Cargo.lock"))?;
         fs::write(
             folder.join("Cargo.lock"),
@@ -94,10 +94,10 @@ impl User {
         Ok(user)
     }
 
-    /// What `cargo check` and `cargo build` take for this `main.rs`.
+    /// The time of `cargo check` and of `cargo build` for this `main.rs`.
     ///
     /// # Errors
-    /// Where the file cannot be written, or Cargo cannot be started.
+    /// If the file cannot be written, or Cargo cannot be started.
     pub fn compile(&self, program: &str) -> Result<(Outcome, Outcome), Box<dyn Error>> {
         fs::write(self.main(), program)?;
         Ok((self.measured("check")?, self.measured("build")?))
@@ -113,7 +113,8 @@ impl User {
         if let Profile::Release = self.profile {
             cargo.arg("--release");
         }
-        // The settings of whoever runs this are not those of a user, and every measurement compiles the whole crate.
+        // Settings in the environment of whoever runs this are not those of a user; and every measurement must compile
+        // the whole crate.
         cargo.env("CARGO_TARGET_DIR", self.folder.join("target"));
         cargo.env("CARGO_INCREMENTAL", "0");
         cargo
@@ -134,12 +135,13 @@ impl User {
     }
 }
 
-/// Processor seconds, of the user and of the system, of all processes that this one has started and that have ended, with theirs.
+/// Processor seconds, user and system time, of all processes that this one has started and that have ended, including
+/// theirs.
 fn of_children() -> Result<f64, Box<dyn Error>> {
-    /// Ticks a second in `/proc`, the same on all of Linux's architectures that matter here.
+    /// Clock ticks per second in `/proc`; the same on all relevant architectures of Linux.
     const TICKS: f64 = 100.0;
     let line = fs::read_to_string("/proc/self/stat")?;
-    // The name of the program stands in parentheses and may hold anything.
+    // The name of the program is in parentheses and may contain anything.
     let (_, numbers) = line.rsplit_once(')').ok_or("/proc/self/stat has no name")?;
     let mut ticks = 0.0;
     // cutime and cstime are the fields 16 and 17, of which the first after the name is 3.
