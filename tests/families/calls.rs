@@ -1,4 +1,5 @@
-//! The calls of the surface on models of run-time length: what works gives what a model of fixed size gives, what does not is one typed error.
+//! The calls of the library for models of run-time length: those that work give the same as for a model of fixed size,
+//! and the others are a typed error.
 
 use crate::common::distance;
 use tfe::Warning;
@@ -16,7 +17,7 @@ struct Chain {
     a: f64,
 }
 
-/// The same three masses, of fixed size.
+/// The same three masses with fixed size.
 #[dynamics(
     coordinates(x, y, z),
     lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - (y - x)^2/2 - a/4*(y - x)^4 - (z - y)^2/2 - a/4*(z - y)^4 - x^2/2,
@@ -77,7 +78,8 @@ fn steps_tell_costs_and_doubts() {
     assert_eq!(steps.warnings(), []);
 }
 
-/// Driven, damped, without an energy to compare: two steps of 1 to 3 from 100 states. An end that is wrong by a fifth of the way is told, as of models of fixed size.
+/// A driven, damped model without a conserved energy: two steps of 1 to 3 from 100 states. An end with an error of a
+/// fifth of the path must have a warning, as for models of fixed size.
 #[test]
 fn steps_that_do_not_resolve_a_driven_motion_are_told() {
     #[dynamics(
@@ -132,7 +134,7 @@ fn ensembles() {
     let one = one.run(starts[7].clone(), 0.0..10.0).expect("a run");
     assert_eq!(ends[7].as_ref(), Ok(one.last()));
 
-    // Parameter sets; a bad start fails alone.
+    // Parameter sets; an invalid initial state fails on its own.
     let chains: Vec<_> = (0..4)
         .map(|k| Chain {
             n: 3,
@@ -149,7 +151,7 @@ fn ensembles() {
     let ends = ends.expect("an ensemble");
     let failures: Vec<_> = ends.failures().map(|failure| failure.index).collect();
     assert_eq!(failures, [2]);
-    // In parts, to the bit; the same starts, and one that is none.
+    // As continued runs, with the same bits; the same initial states, and an invalid one.
     let many = Ensemble::of_models(&chains).step(0.1);
     let mut parts = many.begin(&bad, 0.0).expect("starts");
     for steps in [0.0, 7.0, 20.0, 23.5] {
@@ -196,7 +198,7 @@ fn transition_matrices_need_a_feature() {
     assert_eq!(error.kind(), &tfe::RunErrorKind::Unsupported { call, of });
 }
 
-/// Two pendulums on rods, one hanging from the other, whose top one is pushed by a moving hand.
+/// Two pendulums on rods, one hanging from the other; the upper one hangs from a moving hand.
 #[cfg(feature = "sparse")]
 mod rods {
     use super::*;
@@ -232,7 +234,7 @@ mod rods {
     fn reactions_are_those_of_fixed_size() {
         let (m, g, c) = (0.7, 9.81, 0.3);
         let (rods, two) = (Rods { n: 2, m, g, c }, TwoRods { m, g, c });
-        // The upper rod moves with the hand, which begins at 1/5.
+        // The upper rod moves with the hand, whose initial velocity is 1/5.
         let (q, v) = ([0.0, 1.0, -1.0, -1.0], [0.2, 0.2, 0.0, 0.5]);
         let run = Simulation::new(&rods).element(Mixed::<5>).step(0.01);
         let run = run.run(rods.state(q, v), 0.0..2.0).expect("a run");
@@ -251,7 +253,7 @@ mod rods {
             assert_eq!(here.len(), 201);
             assert!(distance(&here, &there) < 1e-9 * 20.0, "{name}");
         }
-        // At rest in a line the rods carry what hangs below: of (x² + y² − 1) λ the force is 2 λ.
+        // At rest in a line, the rods carry what hangs below; the force of (x² + y² − 1) λ is 2 λ.
         let (hanging, none) = ([0.0, 0.0, -1.0, -2.0], [0.2, 0.2, 0.0, 0.0]);
         let still = Rods { c: 0.0, ..rods };
         let run = Simulation::new(&still).step(0.01);

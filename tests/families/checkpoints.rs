@@ -1,4 +1,4 @@
-//! Runs of families that go on where others ended.
+//! Runs of models of run-time length that continue from where others ended.
 
 use crate::common::distance;
 use tfe::error::RunErrorKind;
@@ -16,7 +16,8 @@ struct Chain {
     c: f64,
 }
 
-/// One run, and two of it that are cut, at every node: all states, velocities and energies are the same numbers.
+/// One run compared with two parts of it, interrupted at every node: all states, velocities and energies have the same
+/// bits.
 fn check<M: family::Model>(
     simulation: &family::Simulation<'_, M>,
     start: &FamilyState,
@@ -63,7 +64,7 @@ fn two_halves_are_one_run_to_the_bit() {
     }
 }
 
-/// Newton's method keeps factors from step to step.
+/// Newton's method keeps factors from step to step; the checkpoint has them, too.
 #[cfg(feature = "sparse")]
 #[test]
 fn halves_of_stiff_runs() {
@@ -110,7 +111,7 @@ fn halves_of_constrained_runs() {
     }
 }
 
-/// A model whose lists are others has other masses, and nothing of those before is carried on.
+/// A model with other lists has other masses; nothing that depends on the former ones is carried over.
 #[test]
 fn other_lists_go_on_from_a_checkpoint() {
     #[dynamics(
@@ -135,12 +136,12 @@ fn other_lists_go_on_from_a_checkpoint() {
     let resumed = second.resume(checkpoint, 4.0).expect("a run");
     let anew = second.run(checkpoint.state().clone(), 2.0..4.0);
     let (one, other) = (resumed.last().state(), anew.expect("a run").last().state());
-    // Twenty steps whose times are off by roundings.
+    // The rounding errors of twenty steps, whose times have rounding errors, too.
     assert!(distance(&one.q, &other.q) < 1e-13, "{one:?} {other:?}");
     assert!(distance(&one.p, &other.p) < 1e-13, "{one:?} {other:?}");
 }
 
-/// A checkpoint beside the grid begins a new one; another element and another length are no obstacle and an error.
+/// A checkpoint off the grid starts a new one; another element is possible, and another length is an error.
 #[test]
 fn checkpoints_of_other_runs() {
     let chain = |n| Chain { n, k: 1.0, c: 0.1 };
@@ -158,7 +159,7 @@ fn checkpoints_of_other_runs() {
         let second = run.resume(checkpoint, 4.0).expect("a run");
         assert_eq!(second.states()[0].t, 1.23);
         for (q, expected) in second.last().q.iter().zip(&whole.last().q) {
-            // Both are off by the sixth power of the step.
+            // Both have errors of the sixth power of the step.
             assert!((q - expected).abs() < 1e-6, "{q}, {expected}");
         }
     }

@@ -1,4 +1,4 @@
-//! Motions of families on constraints.
+//! Motions of models of run-time length with constraints.
 
 use crate::common::larger;
 use tfe::error::RunErrorKind;
@@ -6,7 +6,7 @@ use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
 use tfe::{StepError, family};
 
-/// A chain of rods whose first one hangs on a support that swings, with damping and springs between next but one neighbours.
+/// A chain of rods whose first one hangs from a moving support, with damping, and springs between second neighbours.
 #[dynamics(
     coordinates(x[n], y[n]),
     lagrangian = sum(i in 0..n, m[i]/2*(dot(x[i])^2 + dot(y[i])^2) - m[i]*g*y[i])
@@ -64,7 +64,7 @@ fn rods() -> Rods {
     }
 }
 
-/// A bent chain; the support moves with `a` to the right, and so does the chain.
+/// A bent chain; the support moves with `a` to the right, and the chain with it.
 fn start() -> ([f64; 8], [f64; 8]) {
     let (mut q, mut v) = ([0.0; 8], [0.0; 8]);
     let (mut x, mut y) = (0.0, 0.0);
@@ -107,19 +107,19 @@ fn rods_move_as_those_of_fixed_size() {
                 other.at(time).expect("inside"),
             );
             for a in 0..8 {
-                // Roundings over fifty steps.
+                // The rounding errors of fifty steps.
                 assert!((one.q[a] - other.q[a]).abs() < 1e-12, "{element} {time}");
                 assert!((one.p[a] - other.p[a]).abs() < 1e-11, "{element} {time}");
             }
         }
-        // Roundings of squares of size one, and of their rates.
+        // The rounding errors of squares of order one, and of their rates.
         let residual = one.constraint_residual();
         assert!(residual.position < 1e-14, "{element}: {residual:?}");
         assert!(residual.velocity < 1e-13, "{element}: {residual:?}");
     }
 }
 
-/// 2 (n − 1) in coordinates and momenta, on a nonlinear problem.
+/// The order is 2 (n − 1) in coordinates and momenta, for a nonlinear problem.
 #[test]
 fn the_order_on_constraints_is_that_of_the_element() {
     let (model, (q, v)) = (rods(), start());
@@ -199,7 +199,7 @@ fn starts_off_the_constraints_are_refused() {
     );
 }
 
-/// Beside a support at 1e9 m rods of a metre were taken with errors of up to ten metres.
+/// Close to a support at 1e9 m, rods of one metre were accepted with errors of up to ten metres.
 #[test]
 fn rods_far_from_the_origin_have_their_lengths() {
     let far = 1e9;
@@ -208,14 +208,14 @@ fn rods_far_from_the_origin_have_their_lengths() {
     for x in &mut q[..4] {
         *x += far;
     }
-    // The support stands there, at the end of its way.
+    // The support is at rest there, at its maximum.
     let begin = std::f64::consts::FRAC_PI_2;
     let outcome = |q: [f64; 8]| {
         let run = Simulation::new(&model).step(1e-6);
         let motion = run.run(model.state(q, [0.0; 8]), begin..begin + 1e-6);
         motion.map_or_else(|error| error.to_string(), |_| String::new())
     };
-    // What the start is rounded by is no violation.
+    // The rounding error of the initial state is not a violation.
     let text = outcome(q);
     assert!(!text.contains("violates"), "{text}");
     q[3] += 0.1;
@@ -244,7 +244,7 @@ fn what_cannot_hold_constraints_is_refused() {
     );
 }
 
-/// A closed ring has a row for each rod and two pins: more rows than a chain, and none that follows from others.
+/// A closed ring has a constraint for each rod and two pins: more than a chain, and none of them is redundant.
 #[test]
 fn a_hanging_ring_keeps_its_energy() {
     #[dynamics(

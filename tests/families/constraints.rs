@@ -1,4 +1,5 @@
-//! The kernels of constraints by site: against those of the same model of fixed size, their names, and what lengths must obey.
+//! The kernels of constraints at sites: compared with those of the same model of fixed size; their names; and the
+//! conditions on lengths.
 
 use std::collections::BTreeMap;
 use tfe::family::{self, Block, Entries, Model as _};
@@ -63,7 +64,7 @@ impl Entries<f64> for Dense {
     }
 }
 
-/// Some ten operations on numbers of size one, in another order.
+/// About ten operations on numbers of order one, in a different order.
 #[track_caller]
 fn close(a: f64, b: f64) {
     assert!((a - b).abs() <= 1e-14 * b.abs().max(1.0), "{a} {b}");
@@ -181,14 +182,14 @@ fn indices_of_constraints_are_checked() {
     let error = Ties { n: 3, w: 3 }.check().expect_err("no fourth");
     let message = "the index of `x[3]` in `constraint(last)` becomes 3, but `x` has 3 elements";
     assert_eq!(error.to_string(), message);
-    // Lengths that no memory holds are refused before anything is counted.
+    // Lengths that exceed any memory are refused before anything is counted.
     for n in [1 << 60, usize::MAX] {
         assert!(Ties { n, w: 3 }.check().is_err());
         assert!(Ties { n, w: n }.check().is_err());
     }
 }
 
-/// Affine constraints have no second derivatives, models without constraints no rows.
+/// Affine constraints have no second derivatives, and models without constraints have no rows.
 #[test]
 fn what_is_not_there_is_empty() {
     #[dynamics(coordinates(x[n]), momenta(p[n]), hamiltonian = sum(i in 0..n, p[i]^2/2), constraint(gap[i in 0..n-1]) = x[i+1] - x[i] - 1)]

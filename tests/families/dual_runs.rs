@@ -1,4 +1,4 @@
-//! Derivatives of a run of a hundred sites beside those of an oracle in dual numbers.
+//! Derivatives of a run of a hundred sites compared with an independent solver in dual numbers.
 
 use super::gradient::{Chain, chain};
 use crate::duals::{self, Beside, Phase, number};
@@ -6,7 +6,7 @@ use tfe::family::{Gradient, Loss, Model as _};
 use tfe::prelude::*;
 use tfe::runtime::dual::Dual;
 
-/// Rates and forces; the mass matrix is diagonal and constant, so that L_v for velocities of one tells it.
+/// Rates and forces; the mass matrix is diagonal and constant, so that L_v at velocities of one gives it.
 fn flow(model: &Chain, time: Dual, (q, p): (&[Dual], &[Dual]), rate: &mut Vec<Dual>) -> Vec<Dual> {
     let n = q.len();
     let first = |v: &[Dual]| {
@@ -59,7 +59,8 @@ fn derivatives_of_a_hundred_sites_are_those_of_runs_in_dual_numbers() {
         assert!(found.is_finite() && forwards.is_finite());
         (off, size) = (off.max((found - forwards).abs()), size.max(forwards.abs()));
     };
-    // Every thirteenth of the masses and springs, and all that concern all sites; gradients beside all of them.
+    // Every thirteenth mass and spring, and all parameters common to all sites; gradients are compared with all of
+    // these.
     assert_eq!(s.parameters().len(), 2 * SITES - 1 + 4);
     for (index, name) in s.parameters().iter().enumerate() {
         let by = s.by(name).last();
@@ -81,7 +82,7 @@ fn derivatives_of_a_hundred_sites_are_those_of_runs_in_dual_numbers() {
             beside.by_start(column, &found[SITES..], &found[..SITES]);
         }
     }
-    // Roundings of eight steps of both.
+    // The rounding errors of eight steps of both.
     assert!(beside.off() < 1e-12, "{:.1e}", beside.off());
     assert!(off < 1e-12 * size, "{off:.1e} of {size:.1e}");
 }

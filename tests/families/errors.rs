@@ -1,4 +1,5 @@
-//! Lengths that do not belong together, and what families cannot do yet: typed errors that name the sum and the index.
+//! Inconsistent lengths, and what is not supported for models of run-time length: typed errors that name the sum and
+//! the index.
 
 use tfe::RunErrorKind;
 use tfe::family::{self, FamilyState, Model as _, momenta};
@@ -105,7 +106,7 @@ fn lengths_are_checked_before_anything_else() {
     );
 }
 
-/// Neither do sums of lengths overflow, nor is anything counted up to them.
+/// Sums of lengths do not overflow either, and nothing is counted up to them.
 #[test]
 fn lengths_of_no_array_are_errors() {
     let mut message = String::new();
@@ -122,7 +123,7 @@ fn lengths_of_no_array_are_errors() {
     );
 }
 
-/// An index outside of any sum is named without one.
+/// An index outside any sum is reported without one.
 #[test]
 fn a_single_index_is_checked_too() {
     #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2) - q[2]^4)]
@@ -167,7 +168,7 @@ fn states_of_another_length_are_refused() {
     assert_eq!(steps.next(), None);
 }
 
-/// A length that no memory holds is compared with the vectors before any memory is asked for.
+/// A length that exceeds any memory is compared with the vectors before memory is allocated.
 #[test]
 fn an_absurd_length_is_an_error() {
     #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2 - q[i]^4))]
@@ -212,7 +213,7 @@ fn bad_starts_steps_and_spans_are_refused() {
     ));
 }
 
-/// A step far too long for the fixed point: the error says so and holds the motion until then.
+/// A step far too long for fixed-point iteration: the error says so and contains the motion up to there.
 #[cfg(not(feature = "sparse"))]
 #[test]
 fn a_stiff_chain_says_that_the_fixed_point_failed() {
@@ -270,7 +271,7 @@ fn what_families_cannot_do_yet_is_said() {
         p: vec![0.0; 3],
     };
     let run = Simulation::new(&OffDiagonal { n: 3 }).run(start.clone(), 0.0..1.0);
-    // Three masses in a row, each coupled to its neighbours alone: singular, too.
+    // Three masses in a row, each coupled to its neighbours only: singular, too.
     let expected = if cfg!(feature = "sparse") {
         family::ModelError::NoVelocity
     } else {
@@ -317,7 +318,7 @@ fn what_families_cannot_do_yet_is_said() {
     ));
 }
 
-/// Twice the same rod: the sparse matrix would be singular.
+/// The same rod twice: the sparse matrix would be singular.
 #[cfg(feature = "sparse")]
 #[test]
 fn dependent_rows_are_refused() {

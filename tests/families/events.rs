@@ -1,4 +1,4 @@
-//! Events of models of run-time length, beside those of the same model of fixed size.
+//! Events of models of run-time length, compared with those of the same model of fixed size.
 
 use crate::common::distance;
 use std::error::Error;
@@ -6,7 +6,7 @@ use tfe::error::RunErrorKind;
 use tfe::family;
 use tfe::prelude::*;
 
-/// Masses on a line between walls, each tied to its neighbours.
+/// Masses on a line between walls, joined to their neighbours.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1] - q[i])^2/2 + a/4*(q[i+1] - q[i])^4) - q[0]^2/2,
@@ -19,7 +19,7 @@ struct Chain {
     a: f64,
 }
 
-/// The same three of fixed size.
+/// The same three masses with fixed size.
 #[dynamics(
     coordinates(x, y, z),
     lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - (y - x)^2/2 - a/4*(y - x)^4 - (z - y)^2/2 - a/4*(z - y)^4 - x^2/2,
@@ -31,7 +31,7 @@ struct Three {
     a: f64,
 }
 
-/// The same with momenta.
+/// The same as Hamiltonians.
 #[dynamics(
     coordinates(q[n]),
     momenta(p[n]),
@@ -79,7 +79,7 @@ fn recorded_events_change_no_bit() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Bounces off a wall, by a state of one's own and by the impact along the normal; stops; blows.
+/// Bounces off a wall, by a given state and by an impact along the normal; stops; impulses.
 #[test]
 fn acts_are_those_of_fixed_size() -> Result<(), Box<dyn Error>> {
     let run = long()
@@ -153,7 +153,7 @@ fn momenta_and_functions() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Steps, halves of runs, accuracies and ensembles go through events as runs do.
+/// Steps, halves of runs, accuracies and ensembles handle events as runs do.
 #[test]
 fn every_kind_of_run() -> Result<(), Box<dyn Error>> {
     let bounce = |event: &tfe::Occurrence<'_, 0, family::RunTimeLength>| {
@@ -189,7 +189,7 @@ fn every_kind_of_run() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Points of a section are the events of a run.
+/// The points of a section are the events of a run.
 #[test]
 fn sections() -> Result<(), Box<dyn Error>> {
     let start = || CHAIN.state(Q, V);
@@ -250,7 +250,7 @@ fn what_cannot_be_is_a_typed_error() {
     assert!(matches!(short, RunErrorKind::Start { .. }), "{short:?}");
 }
 
-/// A row of pendulums on rods, the last of which hits a wall: as in coordinates of angles.
+/// A row of pendulums with rods, the last of which hits a wall: compared with coordinates in angles.
 #[cfg(feature = "sparse")]
 #[test]
 fn impacts_along_constraints() -> Result<(), Box<dyn Error>> {
@@ -334,7 +334,7 @@ struct ThreeSprings {
     k: [f64; 2],
 }
 
-/// A spring yields at one event; at another masses change, and velocities stay.
+/// A spring yields at one event; at another one masses change, while velocities remain.
 #[test]
 fn parameters_are_set_at_events() -> Result<(), Box<dyn Error>> {
     let springs = Springs {
@@ -385,9 +385,9 @@ fn parameters_are_set_at_events() -> Result<(), Box<dyn Error>> {
             assert!((a - b).abs() < 1e-11, "{a} {b}");
         }
     }
-    // The caller's model is as it was.
+    // The caller's model is unchanged.
     assert_eq!((springs.m, &springs.k[..]), (1.2, &[2.0, 3.0][..]));
-    // Steps see the new parameters, too, and runs of several starts.
+    // Steps use the new parameters, too, and so do ensembles.
     let run = Simulation::new(&springs).element(Mixed::<6>).step(0.1).on(
         "first",
         Crossing::Rising,

@@ -1,4 +1,5 @@
-//! Gradients of losses of models of run-time length, backwards: what derivatives forwards make of them.
+//! Gradients of losses of models of run-time length by the adjoint (backward) method, compared with forward
+//! derivatives.
 
 use super::sensitive::{Five, Long, LongPendula};
 use tfe::RunErrorKind;
@@ -6,8 +7,9 @@ use tfe::family::{FamilyState, Loss, Model, RunError};
 use tfe::length::RunTimeLength;
 use tfe::prelude::*;
 
-/// The largest difference of a gradient backwards and of that made of derivatives forwards, over the largest derivative. The loss looks at the end by coordinates, momenta and velocities, at an output there, and at
-/// an output at four times, of which one is the start.
+/// The largest difference between a backward gradient and the one composed of forward derivatives, relative to the
+/// largest derivative. The loss contains coordinates, momenta, velocities and an output at the end, and an output at
+/// four times, one of which is the start.
 fn off<M: Model>(
     run: &Simulation<'_, M, 0, RunTimeLength>,
     start: &FamilyState,
@@ -67,7 +69,7 @@ fn off<M: Model>(
             slope(&s.by(name).last(), &|at| slopes[at]),
         );
     }
-    // By the start there are no velocities forwards: a loss without them.
+    // There are no forward derivatives of velocities by the initial state: use a loss without them.
     let loss = Loss::of_end(|q, p, _| q[0].sin() + 0.5 * p[q.len() - 1].powi(2))
         .and(Loss::squares(output, times, values));
     let (_, gradient) = run
@@ -93,7 +95,7 @@ fn off<M: Model>(
     off / size
 }
 
-/// Springs of which each is a parameter, and a friction of its own: M q̈ = f with a constant diagonal M.
+/// Springs each with its own stiffness as a parameter and friction: M q̈ = f with a constant diagonal M.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2) - sum(i in 0..n-1, k[i]*((q[i+1] - q[i])^2/2 + b*(q[i+1] - q[i])^4/4)),
@@ -135,7 +137,7 @@ fn needs_newton<M: Model>(run: &Simulation<'_, M, 0, RunTimeLength>, start: &Fam
 
 #[test]
 fn gradients_backwards_are_derivatives_forwards() {
-    // Roundings of twenty steps and of both solutions.
+    // The rounding errors of twenty steps and of both solutions.
     const ROUNDING: f64 = 1e-12;
     let elements = [
         Element::mixed(2),
@@ -154,7 +156,7 @@ fn gradients_backwards_are_derivatives_forwards() {
         let off = off(&run.impulse(0.42, kick.clone()), &start, "middle");
         assert!(off < ROUNDING, "{element}: {off:.1e}");
     }
-    // So stiff that the iteration contracts slowly, and the matrix is factored.
+    // So stiff that the iteration converges slowly, and the matrix is factorised.
     let stiff = Chain {
         k: vec![700.0; 11],
         b: 0.0,
@@ -180,7 +182,7 @@ fn gradients_backwards_are_derivatives_forwards() {
         let off = off(&run, &start, "power");
         assert!(off < ROUNDING, "{element}: {off:.1e}");
     }
-    // In phase space, with friction by momenta.
+    // A Hamiltonian with momentum-dependent friction.
     let pendula = LongPendula {
         n: 3,
         m: 0.7,
@@ -211,7 +213,8 @@ fn gradients_backwards_are_derivatives_forwards() {
     assert!(off_stiff < 10.0 * ROUNDING, "{off_stiff:.1e}");
 }
 
-/// Two heavy sites on a spring of their own, beside light ones on weak springs: what the gradient has of them is smaller by their mass, with as many digits.
+/// Two heavy sites with a spring of their own, next to light ones on weak springs: their part of the gradient is
+/// smaller by their mass, and must have as many digits.
 #[test]
 fn gradients_of_heavy_sites_keep_their_digits() {
     let model = Chain {
@@ -247,7 +250,7 @@ fn gradients_of_heavy_sites_keep_their_digits() {
     }
 }
 
-/// Elements that were left at a tolerance end beside where they end when they are solved once more; derivatives are as good as that.
+/// With a loose tolerance, elements end within that tolerance of their exact ends; derivatives have the same accuracy.
 #[test]
 fn runs_with_a_tolerance_have_derivatives() {
     let (model, start) = chain(12);
@@ -282,7 +285,7 @@ fn a_hundred_sites_backwards_and_forwards() {
     assert!(off < 1e-12, "{off:.1e}");
 }
 
-/// Nodes that are not kept are made again on the way back: the same gradient, and less memory.
+/// Nodes that are not stored are computed again during the backward sweep: the same gradient with less memory.
 #[test]
 fn runs_that_keep_some_nodes_have_the_gradients_of_those_that_keep_all() {
     fn all_of<M: Model>(
@@ -312,7 +315,7 @@ fn runs_that_keep_some_nodes_have_the_gradients_of_those_that_keep_all() {
             .and(Loss::squares("middle", times, [0.2, -0.1, 0.4, 0.1, 0.3]).times(0.7))
             .and(Loss::output_at_end("middle"))
             .and(Loss::integral("middle"));
-        // A kick inside, and one at a node that is kept.
+        // One impulse inside, and one at a node that is stored.
         let run = Simulation::new(&model).element(element).step(0.05);
         let run = match length == 0.0 {
             true => run,
@@ -345,7 +348,7 @@ fn runs_that_keep_some_nodes_have_the_gradients_of_those_that_keep_all() {
     assert!(8 * some < all, "{some} bytes beside {all}");
 }
 
-/// Those of the same model of fixed size, by a mass, springs and a friction.
+/// Compared with the same model of fixed size, by a mass, springs and a friction.
 #[test]
 fn second_derivatives_are_those_of_fixed_size() {
     let (m, s) = ([1.0, 1.5, 0.7, 2.0, 0.4], [1.0, 2.0, 0.5, 3.0]);
@@ -381,7 +384,8 @@ fn second_derivatives_are_those_of_fixed_size() {
     assert!(found.errors().amax() < 1e-8 * fixed.matrix().amax());
 }
 
-/// A force that jumps at a break where the element has a point: it is that after the break, also where elements are solved once more.
+/// A force that jumps at a break where the element has a quadrature point: the value after the break is used, also when
+/// elements are solved once more.
 #[test]
 fn forces_that_jump_at_breaks() {
     #[dynamics(
@@ -446,7 +450,7 @@ fn losses_that_do_not_belong_are_told() {
         let kind = error(Loss::squares("middle", times, values));
         assert!(matches!(kind, RunErrorKind::Loss { .. }), "{kind}");
     }
-    // Models that do not fit together.
+    // Models that are inconsistent with each other.
     let short = Chain {
         k: vec![1.0],
         ..chain(5).0

@@ -31,7 +31,7 @@ fn struck(times: &[f64]) -> family::Simulation<'static, Chain> {
     (times.iter()).fold(simulation, |run, time| run.impulse(*time, BLOW))
 }
 
-/// In the steps of a model of fixed size, to whose nodes impulses are moved by a break.
+/// Compared with steps of a model of fixed size, with a break that makes the times of the impulses nodes.
 #[test]
 fn they_do_what_they_do_to_models_of_fixed_size() {
     let times = [0.0, 0.51, 1.25];
@@ -61,7 +61,7 @@ fn nodes_show_the_momentum_before_them() {
     assert!(total(10).abs() < 1e-15 && (total(11) - expected).abs() < 1e-15);
 }
 
-/// Runs, halves of runs and single steps are the same to the bit, also where the halves meet at an impulse.
+/// Runs, halves of runs and single steps have the same bits, also if the halves meet at an impulse.
 #[test]
 fn halves_and_steps_are_one_run() {
     let times = [0.0, 0.25, 0.5];
@@ -78,7 +78,7 @@ fn halves_and_steps_are_one_run() {
     }
 }
 
-/// A break moves the grid, so that the second half begins one of its own: what has acted lies before its span.
+/// A break changes the grid, so that the second half begins its own: impulses that have acted are before its span.
 #[test]
 fn halves_off_the_grid_leave_impulses_behind() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^4/4)]
@@ -145,7 +145,7 @@ fn estimates_go_across_them() {
     }
 }
 
-/// A blow on a rod acts at right angles to it alone.
+/// An impulse on a rod acts perpendicular to it only.
 #[cfg(feature = "sparse")]
 #[test]
 fn constraints_take_up_what_is_against_them() {
@@ -160,7 +160,7 @@ fn constraints_take_up_what_is_against_them() {
     let rods = Rods { n: 2 };
     let run = Simulation::new(&rods).step(0.1);
     let run = run.impulse(0.0, [3.0, 0.0, 0.25, 5.0]);
-    // One rod lies along x and is hit along it and across; the other hangs, and is hit along it.
+    // One rod lies along x, with an impulse along it and one across; the other hangs, with an impulse along it.
     let start = rods.state([1.0, 0.0, 0.0, -1.0], [0.0; 4]);
     let motion = run.run(start, 0.0..0.5).expect("a good run");
     let node = &motion.states()[1];

@@ -1,10 +1,10 @@
-//! Inputs of models of run-time length: functions of the time, tables, loops of control.
+//! Inputs of models of run-time length: functions of time, tables, control loops.
 
 use tfe::family::{self, Model as _, STRIDE};
 use tfe::prelude::*;
 use tfe::{Driven, InputError, Interpolation, RunErrorKind};
 
-/// A chain on a moving ground, pushed at all of its sites.
+/// A chain on moving ground, with a force on all of its sites.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m*dot(q[i])^2/2) - k/2*(q[0] - w)^2
@@ -41,7 +41,7 @@ struct Written {
     c: f64,
 }
 
-/// Four sites, a length known here.
+/// Four sites, as a model of fixed size.
 #[dynamics(
     coordinates(q[4]),
     lagrangian = sum(i in 0..4, m*dot(q[i])^2/2) - k/2*(q[0] - w)^2
@@ -57,7 +57,7 @@ struct Four {
     c: f64,
 }
 
-/// By its Hamiltonian, with an input that changes a stiffness.
+/// As a Hamiltonian, with an input that changes a stiffness.
 #[dynamics(
     coordinates(q[n]),
     momenta(p[n]),
@@ -108,7 +108,8 @@ fn assert_alike(a: &[f64], b: &[f64], tolerance: f64) {
     }
 }
 
-/// A function given at run time is the same as one that is written in the declaration: chains of two sites, of four, of a register and a bit, and longer than a stride.
+/// A function given at run time gives the same as one written in the declaration: for chains of two sites, of four, of
+/// slightly more than a register, and longer than a stride.
 #[test]
 fn an_input_is_what_a_formula_of_time_is() {
     for (n, end) in [(2, 10.0), (4, 10.0), (9, 10.0), (2 * STRIDE + 77, 1.0)] {
@@ -147,7 +148,7 @@ fn an_input_is_what_a_formula_of_time_is() {
     }
 }
 
-/// Models of both kinds of length, with accuracies, in ensembles, by tables and by both forms.
+/// Models of both kinds of length: with accuracies, in ensembles, with tables, as Lagrangians and Hamiltonians.
 #[test]
 fn both_kinds_of_length_are_driven_alike() {
     let (long, (m, k, a, c)) = (chain(4), (1.3, 4.0, 0.7, 0.05));
@@ -194,7 +195,7 @@ fn both_kinds_of_length_are_driven_alike() {
 
 #[test]
 fn inputs_change_stiffnesses_of_hamiltonians() {
-    // The longer chain says how far it has come.
+    // The longer chain uses strides.
     for (n, end) in [(2 * STRIDE + 77, 1.0), (11, 20.0)] {
         let (given, written) = (Stiffened { n }, StiffenedWritten { n });
         let start = || given.state(wave(n), vec![0.0; n]);
@@ -205,7 +206,7 @@ fn inputs_change_stiffnesses_of_hamiltonians() {
         let b = b.run(start(), 0.0..end).expect("a run");
         assert_alike(&a.last().q, &b.last().q, 1e-12);
     }
-    // What is not given is zero, and so is every input of the model itself.
+    // An input that is not given is zero, and so are all inputs of the model itself.
     let given = Stiffened { n: 11 };
     let start = || given.state(wave(11), vec![0.0; 11]);
     let run = Simulation::new(&given).step(0.05);
@@ -215,7 +216,7 @@ fn inputs_change_stiffnesses_of_hamiltonians() {
     assert!(plain.energy_error() < 1e-9);
 }
 
-/// A loop of control gives what a table of the same values gives, and what it gives for a model of a length known in the declaration.
+/// A control loop gives the same as a table of the same values, and as a model of fixed size.
 #[test]
 fn a_loop_holds_what_was_set() {
     let long = chain(4);
@@ -238,7 +239,7 @@ fn a_loop_holds_what_was_set() {
     let table = run.clone().table("u", times, values, Interpolation::Hold);
     let table = table.run(start(), 0.0..4.0).expect("a run");
     assert_alike(&held.node().q, &table.last().q, 1e-12);
-    // The same law, asked every fifth step.
+    // The same feedback law, sampled every fifth step.
     let mut long = run.hold(start(), 0.0).expect("a run");
     let four = Four {
         m: 1.3,
@@ -260,7 +261,7 @@ fn a_loop_holds_what_was_set() {
     }
 }
 
-/// What functions and callers may do wrong, as for models of fixed size.
+/// Possible mistakes of functions and callers: the errors are as for models of fixed size.
 #[test]
 fn what_is_wrong_with_inputs_is_told() {
     let model = chain(3);
@@ -348,7 +349,7 @@ fn driven_models_are_models() {
     assert_alike(&a.1, &b.1, 1e-11);
 }
 
-/// With constraints, with masses that an input moves, and derivatives.
+/// With constraints, with masses that depend on an input, and derivatives.
 #[cfg(feature = "sparse")]
 mod sparse {
     use super::{assert_alike, chain, u, w, wave, written};
@@ -356,7 +357,7 @@ mod sparse {
     use tfe::prelude::*;
     use tfe::sensitivity::Loss;
 
-    /// A chain of rods whose first end is moved.
+    /// A chain of rods with a moved end.
     #[dynamics(
         coordinates(x[n], y[n]),
         lagrangian = sum(i in 0..n, ((dot(x[i]) + s)^2 + dot(y[i])^2)/2 - 9.81*y[i]),
@@ -382,7 +383,7 @@ mod sparse {
         n: usize,
     }
 
-    /// Bodies that lose mass, coupled by theirs.
+    /// Bodies that lose mass, coupled by their mass matrix.
     #[dynamics(
         coordinates(q[n]),
         lagrangian = sum(i in 0..n, (2 - r)*dot(q[i])^2/2 + cos(q[i])) + sum(i in 0..n-1, b*dot(q[i])*dot(q[i+1])),
@@ -407,7 +408,7 @@ mod sparse {
     fn inputs_push_constrained_models_and_move_masses() {
         let (given, written) = (Rods { n: 3 }, RodsWritten { n: 3 });
         let start = || given.state([1.0, 2.0, 3.0, 0.0, 0.0, 0.0], [0.0; 6]);
-        // The momenta of a moving ground are those at the start.
+        // The momenta on moving ground are those at the start.
         let moved = |mut state: tfe::family::FamilyState| {
             state.p[..3].iter_mut().for_each(|p| *p = w(0.0));
             state
@@ -458,7 +459,7 @@ mod sparse {
     }
 }
 
-/// Functions are asked within the span of a run and nowhere else, where they may be defined no more.
+/// Functions are called for times within the span of a run only; outside they may be undefined.
 #[test]
 fn functions_are_not_asked_beyond_the_span() {
     let wind = |t: f64| {

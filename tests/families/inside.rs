@@ -1,4 +1,4 @@
-//! Derivatives between the nodes and of integrals of outputs: those of models of fixed size.
+//! Derivatives between the nodes and of integrals of outputs: compared with models of fixed size.
 
 use super::gradient::{Chain, chain};
 use super::sensitive::{Five, LongPendula, ThreePendula, pair};
@@ -8,7 +8,7 @@ use tfe::prelude::*;
 use tfe::sensitivity::Loss;
 use tfe::{AtError, Model};
 
-/// The chain of the gradients with six masses.
+/// The chain of the tests of gradients, with six masses.
 #[dynamics(
     coordinates(q[6]),
     lagrangian = sum(i in 0..6, m[i]/2*dot(q[i])^2) - sum(i in 0..5, k[i]*((q[i+1] - q[i])^2/2 + b*(q[i+1] - q[i])^4/4)),
@@ -25,7 +25,8 @@ struct Six {
     omega: f64,
 }
 
-/// The largest difference of two runs, over the largest derivative: between the nodes, and of the gradient of an integral with a look at a node.
+/// The largest difference of two runs relative to the largest derivative: between the nodes, and for the gradient of an
+/// integral plus a value at a node.
 fn off<M: family::Model, F: Model<N>, const N: usize>(
     long: &Simulation<'_, M, 0, RunTimeLength>,
     fixed: &Simulation<'_, F, N>,
@@ -85,7 +86,7 @@ fn off<M: family::Model, F: Model<N>, const N: usize>(
 
 #[test]
 fn between_the_nodes_and_of_integrals() {
-    // Roundings of twenty steps and of both solutions.
+    // The rounding errors of twenty steps and of both solutions.
     const ROUNDING: f64 = 1e-12;
     let elements = [
         Element::mixed(3),
@@ -114,7 +115,7 @@ fn between_the_nodes_and_of_integrals() {
         let off = off(&ours, &theirs, start, "middle");
         assert!(off < ROUNDING, "{element}: {off:.1e}");
     }
-    // So stiff that the matrix is factored.
+    // So stiff that the matrix is factorised.
     let (b, c, f) = (0.0, 1e-3, 1e-3);
     let k = [700.0; 5];
     let stiff = Chain {
@@ -138,7 +139,7 @@ fn between_the_nodes_and_of_integrals() {
         let off = off(&ours, &theirs, start, "power");
         assert!(off < ROUNDING, "{element}: {off:.1e}");
     }
-    // In phase space, with friction by momenta.
+    // A Hamiltonian with momentum-dependent friction.
     let (m, k, b, c) = (0.7, [1.3, 2.1], 0.2, 0.15);
     let long = LongPendula {
         n: 3,

@@ -1,4 +1,5 @@
-//! The kernels of families: against those of the same model of fixed size, against differences, and their patterns.
+//! The kernels of models of run-time length: compared with those of the same model of fixed size and with differences;
+//! and their sparsity patterns.
 
 use std::collections::BTreeMap;
 use tfe::Model;
@@ -69,7 +70,7 @@ fn close(a: f64, b: f64, tolerance: f64) {
     assert!((a - b).abs() <= tolerance * b.abs().max(1.0), "{a} {b}");
 }
 
-/// Sums of some ten terms of size one, in another order.
+/// Sums of about ten terms of order one, in a different order.
 const ORDER: f64 = 1e-14;
 
 #[test]
@@ -127,7 +128,7 @@ fn kernels_are_those_of_the_fixed_size() {
     }
 }
 
-/// A central difference over 2e-5 leaves 1e-10 of third derivatives and 1e-11 of rounding.
+/// The error of a central difference with a spacing of 2e-5: 1e-10 of third derivatives and 1e-11 from rounding.
 #[test]
 fn kernels_are_derivatives() {
     let (long, _) = models();
@@ -183,7 +184,8 @@ struct Chain {
     k: f64,
 }
 
-/// A chain of n bodies has n masses and 3n − 2 entries of stiffness, and scattering by the record gives what the kernel says.
+/// A chain of n bodies has n masses and 3n − 2 entries of stiffness, and scattering the values by the record of places
+/// gives the matrix of the kernel.
 #[test]
 fn the_pattern_of_a_chain_is_a_band() {
     for n in [2, 5, 1000] {
@@ -227,7 +229,7 @@ fn the_pattern_of_a_chain_is_a_band() {
     }
 }
 
-/// Nothing but pairs in the potential.
+/// A potential with pairs only.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, dot(q[i])^2/2) + sum(i in 0..n, sum(j in 0..i, k*cos(q[i]-q[j]))),
@@ -237,7 +239,7 @@ struct Pairs {
     k: f64,
 }
 
-/// ∂²L/∂q_a∂q_b = k cos(q_a − q_b), and the rows of these add up to zero.
+/// ∂²L/∂q_a∂q_b = k cos(q_a − q_b), and each row adds up to zero.
 #[test]
 fn pairs_of_differences_fill_their_diagonal() {
     let k = 0.7;
@@ -266,7 +268,7 @@ fn pairs_of_differences_fill_their_diagonal() {
     }
 }
 
-/// Of fixed size, with a length that nothing checks.
+/// With fixed size, and a length that is not checked.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - c[m-2]*x^2/2)]
 struct LastButOne {
     m: usize,

@@ -1,4 +1,4 @@
-//! Steps of models of run-time length that are cut where forces have kinks and jumps.
+//! Models of run-time length whose steps are cut at kinks and jumps of forces.
 
 use crate::common::larger;
 use tfe::prelude::*;
@@ -17,7 +17,7 @@ struct Beads {
     g: f64,
 }
 
-/// The same four, of a length known here.
+/// The same four with fixed size.
 #[dynamics(
     coordinates(q[4]),
     lagrangian = sum(i in 0..4, dot(q[i])^2/2 - g*q[i] - k/2*min(q[i], 0)^2) - sum(i in 0..3, (q[i+1] - q[i])^2/2),
@@ -28,7 +28,7 @@ struct FourBeads {
     g: f64,
 }
 
-/// Driven against friction that jumps with the direction, and pushed for some time.
+/// Driven, with friction that jumps with the direction of motion, and a force during some time.
 #[dynamics(
     coordinates(x[n]),
     lagrangian = sum(i in 0..n, dot(x[i])^2/2 - x[i]^2/2) - sum(i in 0..n-1, (x[i+1] - x[i])^4/4),
@@ -52,7 +52,7 @@ struct ThreeRubbing {
     w: f64,
 }
 
-/// By momenta: magnets on one side.
+/// A Hamiltonian: magnets on one side.
 #[dynamics(
     coordinates(q[n]),
     momenta(p[n]),
@@ -80,7 +80,8 @@ fn assert_alike(a: &[f64], b: &[f64], tolerance: f64) {
     }
 }
 
-/// The motion of a model of run-time length is that of the model of fixed size, with as many crossings. Elements with points at their ends stop up to 1e-6 of a step before a jump.
+/// The motion of a model of run-time length is that of the model of fixed size, with as many crossings. Elements with
+/// quadrature points at their ends stop up to 1e-6 of a step before a jump.
 macro_rules! assert_same_motion {
     ($long:expr, $fixed:expr, $q:expr, $v:expr, $step:expr, $end:expr, $at_ends:expr) => {{
         let (long, fixed) = (&$long, &$fixed);
@@ -141,7 +142,8 @@ fn kinks_are_those_of_models_of_fixed_size() {
     );
 }
 
-/// Forty beads fall onto the floor: with cuts the energy is kept to roundings, across kinks not.
+/// Forty beads fall onto the floor: with cut steps the energy is conserved up to rounding, with steps across kinks it
+/// is not.
 #[test]
 fn elements_keep_their_order_at_every_site() {
     let beads = Beads {
@@ -169,7 +171,7 @@ fn elements_keep_their_order_at_every_site() {
     }
 }
 
-/// A plate that lands all but flat: many sites cross at all but one time, or one shortly after the other.
+/// A plate that lands almost flat: many sites cross at almost the same time, or shortly after each other.
 #[test]
 fn many_sites_cross_in_one_step() {
     for (n, apart) in [(60, 0.0), (60, 1e-14), (60, 1e-9), (100, 1e-3)] {
@@ -186,7 +188,7 @@ fn many_sites_cross_in_one_step() {
     }
 }
 
-/// An accuracy is met across kinks, and an estimate of steps that go across says so.
+/// An accuracy is met across kinks, and the estimate of runs with steps across kinks has a warning.
 #[test]
 fn accuracies_are_met_across_kinks() {
     let (long, fixed) = (
@@ -218,7 +220,7 @@ fn accuracies_are_met_across_kinks() {
     assert!(!cut.warnings().contains(&Warning::KinksCrossed));
 }
 
-/// Events, checkpoints, ensembles and steps, beside those of the model of fixed size.
+/// Events, checkpoints, ensembles and steps, compared with those of the model of fixed size.
 #[test]
 fn whatever_steps_is_cut() {
     let (long, fixed) = (
@@ -258,7 +260,7 @@ fn whatever_steps_is_cut() {
     assert_alike(&a, &b, 1e-10);
 }
 
-/// A motion that would slide along a jump is an error, as it is for models of fixed size.
+/// A motion that would slide along a jump is an error, as for models of fixed size.
 #[test]
 fn sliding_is_told() {
     let (c, a, w) = (2.0, 0.1, 1.0);
@@ -278,7 +280,7 @@ fn sliding_is_told() {
         "{kind}"
     );
     assert!(error.partial().last().t > 0.0);
-    // Where there is nothing to cut at nothing is asked for, and states of another length are errors.
+    // For a model without kinks the option has no effect, and states of another length are errors.
     let run = Simulation::new(&stuck).step(0.05).at_kinks(true);
     let wrong = Beads {
         n: 3,
@@ -322,7 +324,7 @@ mod sparse {
         k: f64,
     }
 
-    /// Coupled by their masses.
+    /// Masses coupled by the mass matrix.
     #[dynamics(
         coordinates(q[n]),
         lagrangian = sum(i in 0..n, dot(q[i])^2/2 - g*q[i] - k/2*min(q[i], 0)^2) + sum(i in 0..n-1, b*dot(q[i])*dot(q[i+1])*cos(q[i])),

@@ -1,4 +1,4 @@
-//! Lists of indices: networks that are known at run time only.
+//! Lists of indices: networks known at run time only.
 
 use crate::kernels::Dense;
 use tfe::RunErrorKind;
@@ -20,7 +20,7 @@ struct Network {
     right: Vec<usize>,
 }
 
-/// A bond in both directions, one from a site to itself, one that is there twice.
+/// A bond in both directions, one from a site to itself, and one that occurs twice.
 fn network() -> Network {
     Network {
         n: 4,
@@ -48,7 +48,7 @@ fn derivatives(model: &Network, q: &[f64]) -> ([f64; 4], Dense) {
     (by_q, dense)
 }
 
-/// By hand: each bond adds to both of its ends, to one of them twice where they are the same.
+/// By hand: each bond adds to both of its ends, and twice to the same site if these are equal.
 #[test]
 fn kernels_add_up_over_bonds() {
     let model = network();
@@ -66,7 +66,7 @@ fn kernels_add_up_over_bonds() {
         bend[r][l] -= 2.0 * k * x * y.cos() - k;
     }
     for i in 0..4 {
-        // Some ten terms of size one.
+        // About ten terms of order one.
         assert!((by_q[i] - slope[i]).abs() < 1e-14);
         for j in 0..4 {
             let value = dense.0.get(&(Block::QQ, i, j)).copied().unwrap_or(0.0);
@@ -79,7 +79,7 @@ fn kernels_add_up_over_bonds() {
     assert_eq!(stretch, expected);
 }
 
-/// A central difference over 2e-5 leaves 1e-10 of third derivatives and 1e-11 of rounding.
+/// The error of a central difference with a spacing of 2e-5: 1e-10 of third derivatives and 1e-11 from rounding.
 #[test]
 fn second_derivatives_are_those_of_the_first() {
     let model = network();
@@ -98,7 +98,7 @@ fn second_derivatives_are_those_of_the_first() {
     }
 }
 
-/// The same chain by neighbours and by a list, whose bonds come in another order and direction.
+/// The same chain with neighbours and with a list, whose bonds have another order and direction.
 #[test]
 fn a_listed_chain_moves_like_a_chain() {
     #[dynamics(
@@ -139,7 +139,7 @@ fn a_listed_chain_moves_like_a_chain() {
     let other = other.run(listed.state(q, v), 0.0..5.0);
     let (one, other) = (one.expect("a motion"), other.expect("a motion"));
     for (a, b) in one.last().q.iter().zip(&other.last().q) {
-        // A hundred steps that sum in another order.
+        // The rounding errors of a hundred steps with sums in another order.
         assert!((a - b).abs() < 1e-12, "{a} {b}");
     }
 }
@@ -199,7 +199,7 @@ fn entries_of_lists_are_checked() {
     ));
 }
 
-/// Indices that are made of entries, entries of lists of parameters, forces and constraints by list.
+/// Indices computed from entries, entries of lists of parameters, and forces and constraints by lists.
 #[test]
 fn entries_stand_wherever_indices_do() {
     #[dynamics(
@@ -246,7 +246,7 @@ fn entries_stand_wherever_indices_do() {
     assert_eq!(told(|model| model.kind[2] = 2), message);
     let message = "`site[0]` is 3, so the index of `x[2*site[b]+1]` in the sum over `b in 0..w` is out of range: `x` has 6 elements";
     assert_eq!(told(|model| model.site[0] = 3), message);
-    // Of two entries the index is named, with its value.
+    // For an index computed from two entries, the error has its value.
     let message = "the index of `x[last[b]-site[b]]` in the sum over `b in 0..w` becomes -1, but `x` has 6 elements";
     assert_eq!(told(|model| model.last[1] = 0), message);
 }

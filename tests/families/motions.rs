@@ -1,4 +1,4 @@
-//! Motions of families against fixed-size models and against what is known of them.
+//! Motions of models of run-time length compared with models of fixed size and with their known properties.
 
 use crate::common::{larger, list, number, reference};
 use nalgebra::DMatrix;
@@ -30,7 +30,7 @@ struct FiveMasses {
 const START: [f64; 5] = [0.4, -0.1, 0.3, 0.0, -0.5];
 const PUSH: [f64; 5] = [0.1, 0.2, -0.3, 0.4, 0.0];
 
-/// Elements of one, two and four groups of points; forwards and backwards.
+/// Elements with one, two and four groups of points; forwards and backwards in time.
 #[test]
 fn a_chain_moves_as_the_same_model_of_fixed_size() {
     let (m, k, a) = (1.3, 0.9, 0.25);
@@ -52,7 +52,7 @@ fn a_chain_moves_as_the_same_model_of_fixed_size() {
             assert_eq!(family.states().len(), fixed.states().len());
             for (one, other) in family.states().iter().zip(fixed.states()) {
                 for j in 0..5 {
-                    // Some hundred roundings of numbers of size one.
+                    // About a hundred rounding errors of numbers of order one.
                     let (q, p) = (one.q[j] - other.q[j], one.p[j] - other.p[j]);
                     assert!(
                         q.abs() < 1e-13 && p.abs() < 1e-13,
@@ -77,8 +77,8 @@ fn a_chain_moves_as_the_same_model_of_fixed_size() {
     }
 }
 
-/// Flaschka's variables a_i = ½ e^((q_i − q_{i+1})/2), b_i = −½ p_i: the eigenvalues of the tridiagonal matrix with diagonal b and off-diagonal a
-/// do not move.
+/// Flaschka's variables a_i = ½ e^((q_i − q_{i+1})/2), b_i = −½ p_i: the eigenvalues of the tridiagonal matrix with the
+/// diagonal b and the off-diagonal a are constant.
 #[dynamics(
     coordinates(q[n]), momenta(p[n]),
     hamiltonian = sum(i in 0..n, p[i]^2/2) + sum(i in 0..n-1, exp(q[i]-q[i+1])),
@@ -87,7 +87,8 @@ struct Toda {
     n: usize,
 }
 
-/// Steps of very different lengths: an iteration starts from the polynomial of the element before it, which says nothing far behind its end.
+/// Steps of very different lengths: an iteration starts from the polynomial of the previous element, whose
+/// extrapolation far beyond its end is useless.
 #[test]
 fn a_long_step_after_a_short_one_starts_as_that_of_fixed_size() {
     let (m, k, a) = (1.3, 0.9, 0.25);
@@ -162,7 +163,7 @@ fn the_invariants_of_a_toda_chain_stay() {
     assert!(motion.energy_error() < 1e-12, "{:e}", motion.energy_error());
 }
 
-/// Six bodies in space: families of x, y and z, masses as a list, all pairs.
+/// Six bodies in space with x, y and z of each, masses as a list, and all pairs.
 #[dynamics(
     coordinates(x[n], y[n], z[n]),
     lagrangian = sum(i in 0..n, m[i]/2*(dot(x[i])^2 + dot(y[i])^2 + dot(z[i])^2))
@@ -185,7 +186,7 @@ struct SixBodies {
     g: f64,
 }
 
-/// Bodies on circles about the first, which holds nearly all mass.
+/// Bodies on circles about the first one, which has nearly all of the mass.
 fn planets(n: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let (mut m, mut q, mut v) = (vec![1.0], vec![0.0; 3 * n], vec![0.0; 3 * n]);
     for i in 1..n {
@@ -233,7 +234,7 @@ fn pairs_of_bodies_move_as_those_of_fixed_size() {
     let fixed = Simulation::new(&six).element(Mixed::<6>).step(50.0);
     let fixed = fixed.run(fixed_start, 0.0..10_000.0).expect("a run");
     for a in 0..18 {
-        // Coordinates up to 30, 200 steps of one rounding each; errors along the orbits grow with the time.
+        // Coordinates up to 30 and 200 steps of one rounding error each; errors along the orbits grow with time.
         let off = family.last().q[a] - fixed.last().q[a];
         assert!(off.abs() < 2e-12, "{a}: {off:e}");
     }
@@ -253,7 +254,8 @@ fn two_hundred_bodies_run() {
     assert_eq!(motion.last().q.len(), 600);
 }
 
-/// Forces by site, at one site, of the time and of velocities, beside a coordinate of its own; Lagrangian and Hamiltonian.
+/// Forces at each site and at one site, depending on time and velocities, next to a coordinate of its own; as
+/// Lagrangian and Hamiltonian.
 #[dynamics(
     coordinates(s, q[n]),
     lagrangian = dot(s)^2/2 - s^4/4 + sum(i in 0..n, m[i]/2*dot(q[i])^2 - k/2*(q[i]-s)^2),
@@ -330,7 +332,7 @@ fn states_are_made_of_arrays_slices_and_vectors() {
     assert_eq!(chain.state(q, v), expected);
 }
 
-/// A mass of the wrong sign, beside one that is much larger.
+/// A negative mass, next to one that is much larger.
 #[test]
 fn masses_of_both_signs_are_told() {
     for (mass, is_told) in [(-2.0, true), (2.0, false)] {
@@ -355,7 +357,7 @@ fn masses_of_both_signs_are_told() {
     }
 }
 
-/// The endless sequence is the same motion, and so is a run that goes through a break.
+/// The endless sequence of steps is the same motion, and so is a run across a break.
 #[test]
 fn steps_are_those_of_a_run() {
     let chain = Chain {
@@ -386,7 +388,7 @@ fn steps_are_those_of_a_run() {
     assert!(off.abs() < 1e-9, "{off:e}");
 }
 
-/// Velocities of nodes, between nodes and of states; steps that end at breaks.
+/// Velocities at nodes, between nodes and of states; steps that end at breaks.
 #[test]
 fn nodes_have_velocities() {
     let chain = Chain {
@@ -405,7 +407,7 @@ fn nodes_have_velocities() {
     for (node, other) in simulation.steps(start, 0.0).zip(&motion.states()[1..9]) {
         assert_eq!(node.expect("a step"), *other);
     }
-    // The derivative of the polynomial is off by h³ between nodes.
+    // Between nodes, the derivative of the polynomial has an error of h³.
     let between = motion.at(0.34).expect("inside");
     let exact = chain.velocity(0.34, &between.state());
     let apart = exact.iter().zip(&between.v).map(|(a, b)| (a - b).abs());
@@ -444,7 +446,7 @@ struct Stairs {
     step: f64,
 }
 
-/// A step of the potential without a force.
+/// A step of the potential, without its force.
 #[test]
 fn energies_that_jump_are_told() {
     for (step, told) in [(10.0, true), (0.0, false)] {

@@ -1,4 +1,4 @@
-//! Outputs by site: one column each, and a method that gives them all.
+//! Outputs at sites: one column each, and a method that returns all of them.
 
 use tfe::family;
 use tfe::prelude::*;
@@ -24,7 +24,7 @@ fn chain() -> Chain {
     Chain { n, k, l }
 }
 
-/// Four operations on numbers of size one.
+/// Four operations on numbers of order one.
 const ROUNDING: f64 = 4e-15;
 
 #[track_caller]
@@ -114,7 +114,7 @@ fn lengths_of_outputs_are_checked() {
         error,
         family::ModelError::StateLength { vector: "q", .. }
     ));
-    // Lengths that no memory holds are refused before anything is counted.
+    // Lengths that exceed any memory are refused before anything is counted.
     let huge = Chain {
         n: usize::MAX,
         ..chain()
@@ -123,7 +123,7 @@ fn lengths_of_outputs_are_checked() {
     assert!(huge.length(0.0, &Q, &V).is_err());
 }
 
-/// The names of outputs are those of methods; the kernels do not call them.
+/// Outputs named like methods; the kernels must not call these.
 #[test]
 fn outputs_may_be_called_like_parts_of_the_kernel() {
     #[dynamics(

@@ -1,9 +1,10 @@
-//! Families whose rates are the unknowns: kinetic energies of any kind.
+//! Models of run-time length with velocities as unknowns: kinetic energies of any kind.
 
 use crate::common::larger;
 use tfe::prelude::*;
 
-/// n point masses on massless rods of length one, by their angles from the downward vertical: a dense mass matrix that moves.
+/// n point masses on massless rods of length one, in angles from the downward vertical: a dense mass matrix that
+/// depends on the configuration.
 #[dynamics(
     coordinates(theta[n]),
     lagrangian = sum(i in 0..n, (n - i)/2*dot(theta[i])^2 + g*(n - i)*cos(theta[i]))
@@ -62,7 +63,7 @@ fn links_move_as_those_of_fixed_size() {
                 other.at(time).expect("inside"),
             );
             for a in 0..3 {
-                // Roundings over forty steps, of momenta of size ten.
+                // The rounding errors of forty steps, for momenta of order ten.
                 assert!((one.q[a] - other.q[a]).abs() < 1e-12, "{element} {time}");
                 assert!((one.p[a] - other.p[a]).abs() < 3e-11, "{element} {time}");
             }
@@ -75,7 +76,7 @@ fn links_move_as_those_of_fixed_size() {
     }
 }
 
-/// A relativistic chain: momenta are not linear in velocities.
+/// A relativistic chain: momenta depend nonlinearly on velocities.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, -sqrt(1 - dot(q[i])^2)) - sum(i in 0..n-1, k/2*(q[i+1] - q[i])^2),
@@ -101,7 +102,7 @@ fn kinetic_energies_need_not_be_quadratic() {
     }
 }
 
-/// The order of a nonlinear model: 2 (n − 1).
+/// The order for a nonlinear model is 2 (n − 1).
 #[test]
 fn the_order_is_that_of_the_element() {
     let links = Links {

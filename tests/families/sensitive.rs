@@ -1,11 +1,12 @@
-//! Derivatives of motions of models of run-time length: those of models of fixed size, and differences of runs.
+//! Derivatives of motions of models of run-time length: compared with models of fixed size, and with differences of
+//! runs.
 
 use tfe::RunErrorKind;
 use tfe::family::RunError;
 use tfe::prelude::*;
 use tfe::{Model, family};
 
-/// Masses that depend on coordinates, forces, outputs of velocities, a vector of parameters before and between numbers.
+/// Masses that depend on coordinates, forces, outputs with velocities, and a vector of parameters between numbers.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m[i]/2*(1 + q[i]^2)*dot(q[i])^2) + sum(i in 0..n-1, a*dot(q[i])*dot(q[i+1])*sin(q[i]))
@@ -35,7 +36,7 @@ pub(super) struct Five {
     pub(super) c: f64,
 }
 
-/// In phase space, with friction by momenta.
+/// A Hamiltonian with momentum-dependent friction.
 #[dynamics(
     coordinates(q[n]), momenta(p[n]),
     hamiltonian = sum(i in 0..n, p[i]^2/(2*m)) + sum(i in 0..n-1, k[i]*(1 - cos(q[i+1] - q[i]))) + sum(i in 0..n, b*q[i]^4),
@@ -63,7 +64,8 @@ pub(super) struct ThreePendula {
     pub(super) c: f64,
 }
 
-/// The largest difference of all derivatives of two runs, over the largest derivative; and that there are as many.
+/// The largest difference between all derivatives of two runs, relative to the largest derivative; asserts that there
+/// are as many.
 fn compare<M: family::Model, F: Model<N>, const N: usize>(
     (long, long_run): (&M, Simulation<'_, M, 0, tfe::length::RunTimeLength>),
     fixed_run: &Simulation<'_, F, N>,
@@ -124,7 +126,7 @@ fn compare<M: family::Model, F: Model<N>, const N: usize>(
     off / size
 }
 
-/// The same model in both kinds of length.
+/// The same model with both kinds of length.
 pub(super) fn pair() -> (Long, Five) {
     let (m, s) = ([1.0, 1.5, 0.7, 2.0, 0.4], [1.0, 2.0, 0.5, 3.0]);
     let (a, c) = (0.3, 0.2);
@@ -148,7 +150,7 @@ fn derivatives_are_those_of_models_of_fixed_size() {
         Element::radau(3),
         Element::primal(3),
     ] {
-        // Nodes that are not recorded, and an element that ends at a break.
+        // Some nodes are not recorded, and one element ends at a break.
         let ours = Simulation::new(&long)
             .element(element)
             .step(0.1)
@@ -160,7 +162,7 @@ fn derivatives_are_those_of_models_of_fixed_size() {
             .break_at(0.55)
             .record_every(2);
         let off = compare((&long, ours), &theirs, start, "power");
-        // Roundings of fifteen steps and of both solutions.
+        // The rounding errors of fifteen steps and of both solutions.
         assert!(off < 1e-12, "{element}: {off:.1e}");
     }
     let (m, k, b, c) = (0.7, [1.3, 2.1], 0.2, 0.15);
@@ -184,7 +186,7 @@ fn derivatives_are_those_of_models_of_fixed_size() {
     }
 }
 
-/// A hundred sites, of which each spring is a parameter, with a kick on the way: beside differences of runs.
+/// A hundred sites with a spring each as a parameter, and an impulse during the run: compared with differences of runs.
 #[test]
 fn derivatives_of_a_hundred_sites_are_differences_of_runs() {
     #[dynamics(
@@ -223,7 +225,7 @@ fn derivatives_of_a_hundred_sites_are_differences_of_runs() {
     assert_eq!(sensitive.parameters().len(), N);
     for site in [0, 37, 50, 98] {
         let found = sensitive.by(&format!("k[{site}]")).last();
-        // Of sixth order over a distance at which roundings leave 1e-13.
+        // Differences of sixth order with a spacing at which rounding errors lead to 1e-13.
         let d = 0.008;
         let ends = [1.0, 2.0, 3.0].map(|k| [k, -k].map(|k| run(&with(site, k * d))));
         for a in 0..N {

@@ -1,9 +1,10 @@
-//! Stiff families by Newton's method with a sparse factorisation.
+//! Stiff models of run-time length by Newton's method with a sparse factorisation.
 
 use tfe::family::FamilyState;
 use tfe::prelude::*;
 
-/// A rod of masses: stiff springs, a soft anharmonic bed, damping by site and between neighbours, a driven end.
+/// A rod of masses: stiff springs, a soft anharmonic foundation, damping at sites and between neighbours, and a driven
+/// end.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2 - b/4*q[i]^4) - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + k/4*(q[i+1]-q[i])^4),
@@ -31,7 +32,7 @@ struct RodOfFour {
     k: f64,
 }
 
-/// The same by momenta.
+/// The same as a Hamiltonian.
 #[dynamics(
     coordinates(q[n]), momenta(p[n]),
     hamiltonian = sum(i in 0..n, p[i]^2/2/m[i] + b/4*q[i]^4) + sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + k/4*(q[i+1]-q[i])^4),
@@ -88,20 +89,21 @@ fn stiff_rods_move_as_those_of_fixed_size() {
                     one.last().q[a] - other.last().q[a],
                     one.last().p[a] - other.last().p[a],
                 );
-                // Roundings of forces of size k times a stretch, over 60 steps.
+                // The rounding errors of forces of the size k times an elongation, over 60 steps.
                 assert!(
                     q.abs() < 1e-10 && p.abs() < 1e-7,
                     "{element} {k:e} {solve:?}: {q:e} {p:e}"
                 );
             }
             assert!(one.statistics().newton_iterations > 0);
-            // No step is so long that it should be cut: both start where equations this close to linear have one solution nearby.
+            // No step is so long that it has to be cut: the equations are nearly linear, so that both iterations find
+            // the only solution nearby.
             assert_eq!((one.statistics().cuts, other.statistics().cuts), (0, 0));
         }
     }
 }
 
-/// One factorisation serves many steps, and one ordering all of them.
+/// One factorisation is used for many steps, and one ordering for all of them.
 #[test]
 fn factors_serve_many_steps() {
     let n = 1000;
@@ -122,7 +124,7 @@ fn factors_serve_many_steps() {
     let statistics = motion.statistics();
     assert_eq!(statistics.steps, 100);
     assert!(statistics.factorizations < 50, "{statistics:?}");
-    // Damped: the energy falls.
+    // With damping the energy decreases.
     assert!(
         motion.energies().windows(2).all(|pair| pair[1] < pair[0]),
         "{:?}",
@@ -130,7 +132,7 @@ fn factors_serve_many_steps() {
     );
 }
 
-/// Newton's iteration and the fixed point find the same states.
+/// Newton's method and fixed-point iteration find the same states.
 #[test]
 fn both_iterations_end_at_the_same_state() {
     let rod = RodByMomenta {
@@ -151,12 +153,13 @@ fn both_iterations_end_at_the_same_state() {
     };
     let (one, other) = (end(Solve::FixedPoint), end(Solve::Newton));
     for a in 0..50 {
-        // Fifty steps of a few roundings.
+        // A few rounding errors in each of fifty steps.
         assert!((one.q[a] - other.q[a]).abs() < 1e-13 && (one.p[a] - other.p[a]).abs() < 1e-13);
     }
 }
 
-/// A cantilever that falls from a level position: the geometrically exact beam in the plane, strains in the middle of straight elements.
+/// A cantilever that falls from a horizontal position: the geometrically exact planar beam, with strains at the
+/// midpoints of straight elements.
 #[dynamics(
     coordinates(x[n], y[n], phi[n]),
     let l = 1/n,
@@ -175,7 +178,7 @@ struct Cantilever {
     g: f64,
 }
 
-/// Twenty thousand nodes move as two hundred do: the same energy, the same tip, as many factorisations a step.
+/// Twenty thousand nodes move like two hundred: the same energy, the same tip, and as many factorisations per step.
 #[test]
 fn a_long_cantilever_moves_as_a_short_one() {
     let run = |n: usize| {
@@ -201,7 +204,7 @@ fn a_long_cantilever_moves_as_a_short_one() {
     };
     let (few, many) = (run(200), run(5_000));
     println!("{few:?}, {many:?}");
-    // Of m g l = 9.81.
+    // Relative to m g l = 9.81.
     assert!(few.0 < 1e-5 && many.0 < 1e-5, "{few:?}, {many:?}");
     assert!(
         (few.1 - many.1).abs() < 1e-3 * few.1.abs(),

@@ -1,4 +1,5 @@
-//! Kernels that say how far they have come: nothing below that is read or written again, and the forces are those of the kernel at once.
+//! Kernels that report their progress in strides: entries already reported are neither read nor written again, and the
+//! forces are those of the kernel without strides.
 
 use tfe::dynamics;
 use tfe::family::{self, Gradient, Model as _, STRIDE, Sweep};
@@ -12,7 +13,8 @@ struct Chain {
     a: f64,
 }
 
-/// Neighbours of neighbours, the first two and the last one held, masses by site.
+/// Second-neighbour interactions, with the first two sites and the last one attached to the ground, and a mass for each
+/// site.
 #[dynamics(
     coordinates(q[n]), momenta(p[n]),
     hamiltonian = sum(i in 0..n, p[i]^2/(2*m[i])) + sum(i in 2..n-1, exp(q[i] - q[i-2]) + q[i+1]^4/4),
@@ -22,8 +24,8 @@ struct Far {
     m: Vec<f64>,
 }
 
-/// [`Chain`] with indices that begin below zero, which generated loops count from zero; the last five of its sites, wherever they begin; and
-/// two outputs by site whose sums depend on the site.
+/// [`Chain`] with indices that begin below zero, which generated loops count from zero; its last five sites, wherever
+/// they begin; and two outputs at sites with sums that depend on the site.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in -2..n-2, dot(q[i+2])^2/2) - sum(i in -1..n-2, (q[i+2]-q[i+1])^2/2 + a/3*(q[i+2]-q[i+1])^3),
@@ -36,7 +38,7 @@ struct Below {
     a: f64,
 }
 
-/// Spoils what has been passed.
+/// Overwrites the entries that have been reported.
 struct Spoiler {
     q: Vec<f64>,
     z: Vec<f64>,
@@ -70,13 +72,13 @@ impl Sweep<f64> for Spoiler {
     }
 }
 
-/// How often the kernel says something.
+/// The number of reports of the kernel.
 #[track_caller]
 fn words<M: family::Model>(model: &M) -> usize {
     let n = model.len();
     let q: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
     let z: Vec<f64> = (0..n).map(|i| (0.7 * i as f64).cos()).collect();
-    // Whoever writes every place does not mind what is there.
+    // A kernel that assigns all entries does not depend on their former values.
     let by_q = vec![if M::ASSIGNS { 7.0 } else { 0.0 }; n];
     let mut expected = by_q.clone();
     let first = Gradient {
@@ -112,7 +114,8 @@ fn what_was_passed_is_done() {
     }
 }
 
-/// Of what the engine has made of a sum: the interpreter knows signs, generated loops do not.
+/// The results of the engine's transformations of a sum: the interpreter supports negative indices, generated loops do
+/// not.
 #[test]
 fn sums_that_begin_below_zero_have_all_their_turns() {
     let a = 0.25;
@@ -124,7 +127,7 @@ fn sums_that_begin_below_zero_have_all_their_turns() {
             chain.energy_function(0.0, &q, &v),
             below.energy_function(0.0, &q, &v),
         ];
-        // Sums of some thousand terms of the size of one.
+        // Sums of some thousand terms of order one.
         assert!(
             (energies[0] - energies[1]).abs() < 1e-12 * n as f64,
             "{energies:?}"
@@ -139,7 +142,7 @@ fn sums_that_begin_below_zero_have_all_their_turns() {
     }
 }
 
-/// 1 + 2 + 3 + 4 + 5, where the five begin at -3 and at -2, too.
+/// 1 + 2 + 3 + 4 + 5, where the five sites may begin at -3 and at -2, too.
 #[test]
 fn sums_that_begin_below_zero_at_small_lengths_have_all_their_turns() {
     let a = 0.25;
@@ -151,7 +154,7 @@ fn sums_that_begin_below_zero_at_small_lengths_have_all_their_turns() {
     }
 }
 
-/// The sum for the next site reads beyond the last one in a loop over all sites, which does not need it.
+/// The sum for the next site would read beyond the last one in a loop over all sites, and is not needed there.
 #[test]
 fn sums_by_site_stay_in_their_loops() {
     for n in [2, 3, 17] {
@@ -171,7 +174,7 @@ fn sums_by_site_stay_in_their_loops() {
     }
 }
 
-/// The rates of momenta alone.
+/// The rates of momenta only.
 fn of_forces(by_q: &mut [f64]) -> Gradient<'_, f64> {
     Gradient {
         z: &mut [],

@@ -1,6 +1,7 @@
-//! The table of `docs/calls.md`: every call of the surface on models of both kinds of length, free and with constraints. What works is run, what does not has to be a typed error.
+//! The table of `docs/calls.md`: all calls of the library on models of both kinds of length, with and without
+//! constraints. Calls that work are run, and the others must be a typed error.
 //!
-//! `UPDATE_TABLE=1 cargo test --test families the_table` writes it anew.
+//! `UPDATE_TABLE=1 cargo test --test families the_table` writes the table anew.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -61,7 +62,7 @@ struct LongOnRods {
     m: f64,
 }
 
-/// The same four with a kink.
+/// The same four models with a kink.
 #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 - abs(theta))]
 struct Bent;
 
@@ -84,7 +85,7 @@ struct LongBentOnRods {
 
 type Outcome = Result<(), Box<dyn Error>>;
 
-/// What a call comes to: it works, or is refused by an error that says so.
+/// The outcome of a call: it works, or is refused by an error that says so.
 fn told(outcome: Outcome) -> String {
     let Err(error) = outcome else {
         return "works".to_owned();

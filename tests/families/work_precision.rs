@@ -1,4 +1,4 @@
-//! Accuracy against cost of families: by the same calls as of fixed-size models, with the same figures.
+//! Work–precision diagrams for models of run-time length: the same calls and figures as for models of fixed size.
 
 mod constrained;
 
@@ -10,7 +10,7 @@ use tfe::work_precision::{
     Measurements, PeerRun, PhasePoint, Reference, Subject, WorkPrecisionError,
 };
 
-/// Springs with a cubic and a quartic term (Fermi, Pasta, Ulam, Tsingou), ends fixed by springs to walls.
+/// Springs with a cubic and a quartic term (Fermi, Pasta, Ulam, Tsingou); the ends are joined to walls.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2)
@@ -36,7 +36,7 @@ struct ChainOfFour {
     b: f64,
 }
 
-/// A chain by momenta.
+/// A chain as a Hamiltonian.
 #[dynamics(
     coordinates(q[n]), momenta(p[n]),
     hamiltonian = sum(i in 0..n, p[i]^2/2) + sum(i in 0..n-1, exp(q[i]-q[i+1])),
@@ -58,7 +58,7 @@ fn chain(n: usize) -> Chain {
     }
 }
 
-/// A wave of some sites' length.
+/// A wave with a length of a few sites.
 fn wave(n: usize) -> (Vec<f64>, Vec<f64>) {
     let q = (0..n).map(|i| 0.6 * (0.5 * i as f64).sin());
     let v = (0..n).map(|i| 0.3 * (0.7 * i as f64).cos());
@@ -69,7 +69,7 @@ fn halved(from: f64, count: i32) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| from * 0.5_f64.powi(k))
 }
 
-/// Counts and errors are tested, not times.
+/// The tests check counts and errors, not times.
 fn measure<M: Subject<S>, S: PhasePoint>(problem: WorkPrecision<'_, M, S>) -> Measurements {
     problem.repeat_for(Duration::ZERO).run().expect("a chart")
 }
@@ -86,7 +86,8 @@ fn a_family_measures_as_the_same_model_of_fixed_size() {
     );
     let (q, v) = ([0.5, -0.2, 0.1, 0.4], [0.1, 0.2, -0.3, 0.0]);
     let elements = [2, 3, 5].map(Element::mixed);
-    // 3 is no multiple of 0.13: the last step is shorter. One iteration for both, and one that ends far above roundings, takes the same turns.
+    // The span of 3 is not a multiple of 0.13: the last step is shorter. With fixed-point iteration for both, and a
+    // tolerance far above rounding, both take the same number of iterations.
     let steps = [0.25, 0.13, 0.06];
     let family = WorkPrecision::new(&long, long.state(q, v), 0.0..3.0)
         .elements(elements)
@@ -115,7 +116,7 @@ fn a_family_measures_as_the_same_model_of_fixed_size() {
             (one.max_error_p, other.max_error_p),
             (one.energy_error, other.energy_error),
         ] {
-            // Roundings of some ten steps and of a reference of some hundred, of numbers of size one.
+            // The rounding errors of about ten steps, and of a reference of some hundred, for numbers of order one.
             assert!((a - b).abs() < 1e-13, "{one:?} {other:?}");
         }
         assert_eq!(
@@ -130,7 +131,7 @@ fn a_family_measures_as_the_same_model_of_fixed_size() {
     assert_eq!(family.points().count(), 9);
 }
 
-/// 2 (n − 1), fitted over the points that are a power.
+/// The order 2 (n − 1), fitted over the points where the error is asymptotic.
 #[test]
 fn slopes_are_the_orders() {
     let (model, (q, v)) = (chain(32), wave(32));
@@ -157,7 +158,7 @@ fn slopes_are_the_orders() {
     }
 }
 
-/// The chain without its nonlinear terms and with equal masses, in modes of sin(π k (i+1)/(n+1)).
+/// The chain without nonlinear terms and with equal masses, in its modes sin(π k (i+1)/(n+1)).
 #[test]
 fn a_reference_of_ones_own_is_taken() {
     let n = 6;
@@ -191,7 +192,7 @@ fn a_reference_of_ones_own_is_taken() {
         assert_eq!(computed.points().count(), given.points().count());
         for (one, other) in computed.points().zip(given.points()) {
             let (one, other) = (one.error().unwrap(), other.error().unwrap());
-            // At three quarters of a turn the momentum is as large as it gets; the scales are those of start and end.
+            // At three quarters of a period the momentum is at its maximum; the scales are those of start and end.
             assert!(
                 one > 1e-8 && one < 1.1 * other && other < 1.1 * one,
                 "{one:e} {other:e}"
@@ -201,7 +202,7 @@ fn a_reference_of_ones_own_is_taken() {
     assert_eq!(computed.points().count(), function.points().count());
     for (one, other) in computed.points().zip(function.points()) {
         let (one, other) = (one.measured().unwrap(), other.measured().unwrap());
-        // Some hundred roundings.
+        // Some hundred rounding errors.
         assert!((one.max_error_q - other.max_error_q).abs() < 1e-13);
         assert!((one.max_error_p - other.max_error_p).abs() < 1e-13);
     }
@@ -308,7 +309,7 @@ fn starts_and_models_that_do_not_fit_are_errors() {
     };
     assert_eq!(error(&toda, &[0.0; 4], &[0.0; 5]), length("q", 4, 5));
     assert_eq!(error(&toda, &[0.0; 5], &[0.0; 6]), length("p", 6, 5));
-    // Lengths that no memory holds are refused before any is asked for.
+    // Lengths that exceed any memory are refused before any is allocated.
     let absurd = Toda { n: 1 << 40 };
     assert_eq!(
         error(&absurd, &[0.0; 2], &[0.0; 2]),
@@ -326,7 +327,7 @@ fn starts_and_models_that_do_not_fit_are_errors() {
     assert!(matches!(lost, RunErrorKind::Start { coordinate: 2, .. }));
 }
 
-/// Elements and solvers that are not for this model: points without figures, beside others that have some.
+/// Elements and solvers that do not support this model: points without figures, next to others that have some.
 #[test]
 fn what_a_family_cannot_run_is_a_failed_point() {
     let toda = Toda { n: 5 };
@@ -347,7 +348,7 @@ fn what_a_family_cannot_run_is_a_failed_point() {
         line.contains("is not supported for this model of run-time length"),
         "{line}"
     );
-    // No element of one node exists for any model: nothing is measured.
+    // No model has an element with one node: nothing is measured.
     let none = toda_problem(&toda).element(Element::mixed(1)).run();
     assert!(matches!(none, Err(WorkPrecisionError::Element(_))));
     if cfg!(not(feature = "sparse")) {
@@ -410,7 +411,7 @@ fn other_integrators_stand_beside_families() {
     );
 }
 
-/// A tolerance that so few iterations do not meet is no failure of a run that a looser one lets through.
+/// If a few iterations do not meet a tolerance, runs with a looser one must not count as failed.
 #[test]
 fn tolerances_that_are_not_met_are_left_out() {
     let chain = chain(4);

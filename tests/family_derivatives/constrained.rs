@@ -1,4 +1,4 @@
-//! Derivatives of families on constraints: those of models of fixed size, column by column.
+//! Derivatives of constrained models of run-time length: compared with models of fixed size, column by column.
 
 use crate::differences::difference;
 use crate::largest::larger;
@@ -10,7 +10,8 @@ use tfe::prelude::*;
 use tfe::sensitivity::Loss;
 use tfe::{Model, family};
 
-/// A chain of rods on a support that swings, with masses that grow to the sides, damping, and springs between next but one neighbours.
+/// A chain of rods on a moving support, with masses that grow to the sides, damping, and springs between second
+/// neighbours.
 #[dynamics(
     coordinates(x[n], y[n]),
     lagrangian = sum(i in 0..n, m[i]/2*(1 + s*x[i]^2)*(dot(x[i])^2 + dot(y[i])^2) - m[i]*g*y[i])
@@ -87,7 +88,7 @@ fn rods() -> (Rods, ThreeRods) {
     (long, fixed)
 }
 
-/// A start on the constraints at time 0, where the support moves with a ω.
+/// An initial state on the constraints at time 0, where the support moves at a ω.
 fn start(fixed: &ThreeRods) -> State<6> {
     let angles = [0.4_f64, -0.3, 1.1];
     let lengths = [1.0, fixed.l[0], fixed.l[1]];
@@ -159,16 +160,17 @@ fn transition_matrices_are_those_of_fixed_size() {
             let theirs = stability::on_constraints(&fixed, element, &state, 0.0, h);
             let singular = [ours.expect("a matrix"), theirs.expect("a matrix")];
             let [ours, theirs] = singular.map(|matrix| matrix.singular_values());
-            // In other bases of the same motions.
+            // The bases of the tangent space may differ: compare singular values.
             let apart = (ours - theirs).amax();
             assert!(apart < 1e-13 / h.abs(), "{element}, {h}: {apart:e}");
-            // Roundings over h: constraints are held by h times their multipliers.
+            // Rounding errors divided by h: constraints are satisfied by h times their multipliers.
             assert!(off < 1e-14 / h.abs(), "{element}, {h}: {off:e}");
         }
     }
 }
 
-/// Derivatives along a run, at nodes and between them, by the start and by all parameters; gradients of a loss with velocities, outputs and an integral.
+/// Derivatives along a run, at nodes and between them, by the initial state and all parameters; gradients of a loss
+/// with velocities, outputs and an integral.
 fn off<M: family::Model, F: Model<N>, const N: usize>(
     long: &Simulation<'_, M, 0, RunTimeLength>,
     fixed: &Simulation<'_, F, N>,
@@ -182,7 +184,7 @@ fn off<M: family::Model, F: Model<N>, const N: usize>(
     )
 }
 
-/// The same at such times, with so many times the integral.
+/// The same at given times, with a factor for the integral.
 fn off_at<M: family::Model, F: Model<N>, const N: usize>(
     long: &Simulation<'_, M, 0, RunTimeLength>,
     fixed: &Simulation<'_, F, N>,
@@ -215,7 +217,7 @@ fn off_at<M: family::Model, F: Model<N>, const N: usize>(
     }
 
     let mut gradient = Seen::NOTHING;
-    // Of momenta, velocities, an output at the end, and an integral.
+    // With momenta, velocities and an output at the end, and an integral.
     let end = |q: &[f64], p: &[f64], v: &[f64]| q[1] * v[0] + p[N - 1] * v[2];
     let loss = Loss::of_end(end).and(Loss::output_at_end("height"));
     let loss = loss.and(Loss::integral("height").times(integral));
@@ -239,12 +241,12 @@ fn derivatives_of_runs_are_those_of_fixed_size() {
         let ours = Simulation::new(&long).element(element).step(0.02);
         let theirs = Simulation::new(&fixed).element(element).step(0.02);
         let off = off(&ours, &theirs, &state);
-        // 1e-13 of the largest derivative: roundings of forty steps.
+        // 1e-13 of the largest derivative: the rounding errors of forty steps.
         assert!(off.iter().all(|off| *off < 2e-12), "{element}: {off:?}");
     }
 }
 
-/// Impulses, of which constraints take up a part at once; one at the start.
+/// Impulses, to a part of which constraints react at once; one of them at the start.
 #[test]
 fn derivatives_across_impulses_are_those_of_fixed_size() {
     let (long, fixed) = rods();
@@ -262,11 +264,12 @@ fn derivatives_across_impulses_are_those_of_fixed_size() {
             ours = ours.impulse(t, blow.to_vec());
             theirs = theirs.impulse(t, blow);
         }
-        // In the elements that begin with impulses momenta are other polynomials: nodes are the same.
+        // In elements that begin with impulses, the polynomials of momenta differ; nodes agree.
         let looks = (&[0.26, 0.5, 0.777, 0.8][..], 0.0);
         let apart = off_at(&ours, &theirs, &state, looks);
         assert!(apart.iter().all(|off| *off < 2e-12), "{element}: {apart:?}");
-        // By the weight, which leaves the start on the constraints, an integral beside differences of runs.
+        // By the weight, whose change keeps the initial state admissible: an integral compared with differences of
+        // runs.
         let integral = |g: f64| {
             let other = Rods { g, ..long.clone() };
             let mut run = Simulation::new(&other).element(element).step(0.02);
@@ -290,7 +293,7 @@ fn derivatives_across_impulses_are_those_of_fixed_size() {
     }
 }
 
-/// Tops by unit quaternions, whose mass matrix is singular: constraints leave the velocity of a momentum.
+/// Tops described by unit quaternions, with a singular mass matrix: constraints determine the velocity of a momentum.
 #[dynamics(
     coordinates(a[n], b[n], c[n], d[n]),
     lagrangian = sum(i in 0..n,
@@ -359,7 +362,7 @@ fn unit_quaternions_have_the_velocities_and_derivatives_of_fixed_size() {
     }
 }
 
-/// A long chain that hangs: forwards and backwards are the same, and so are the parts between recorded nodes.
+/// A long hanging chain: forward and backward derivatives agree, and so do those of the parts between recorded nodes.
 #[test]
 fn gradients_of_a_long_chain_are_its_derivatives() {
     let n = 25;
@@ -393,7 +396,8 @@ fn gradients_of_a_long_chain_are_its_derivatives() {
         .expect("one");
     let mut seen = Seen::NOTHING;
     seen.see(parts.by_parameters(), plain.by_parameters());
-    // Elements of a part start their iterations elsewhere: their roundings, a thousandfold through 25 rods, are some 1e-12.
+    // The iterations of a part start from other values: their rounding errors, amplified a thousand times by 25 rods,
+    // are about 1e-12.
     assert!(seen.part() < 1e-11, "{:e} of {:e}", seen.off, seen.size);
     let forwards = run.run_sensitive(start(), 0.0..0.3).expect("a run");
     let end = forwards.motion().last().clone();
@@ -408,7 +412,7 @@ fn gradients_of_a_long_chain_are_its_derivatives() {
     assert!(seen.part() < 1e-11, "{:e} of {:e}", seen.off, seen.size);
 }
 
-/// Two rods on a support, the second one driven; with springs that hold the angles.
+/// Two rods on a support, the second one driven, with springs on the angles.
 #[dynamics(
     coordinates(x[n], y[n]),
     lagrangian = sum(i in 0..n, m*(1 + s*x[i]^2)/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
@@ -474,7 +478,7 @@ fn driven(f: f64, a: f64, c: f64) -> (DrivenRods, DrivenTwo) {
     (long, fixed)
 }
 
-/// Two angles, that swing with an amplitude and a phase, as coordinates and velocities.
+/// Two angles that swing with an amplitude and a phase, as coordinates and velocities.
 fn swing(t: f64, omega: f64, amplitude: f64, l: f64) -> ([f64; 4], [f64; 4]) {
     let (sin, cos) = (omega * t).sin_cos();
     let angles = [amplitude * cos, 1.4 * amplitude * cos];
@@ -528,7 +532,7 @@ fn driven_orbits_are_those_of_fixed_size() {
     }
 }
 
-/// Rods without forces but weight.
+/// Rods with no forces except weight.
 #[dynamics(
     coordinates(x[n], y[n]),
     lagrangian = sum(i in 0..n, m*(1 + s*x[i]^2)/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
@@ -571,7 +575,7 @@ fn conservative_orbits_are_those_of_fixed_size() {
     let (one, other) = (ours.orbit(), theirs.orbit());
     assert!((one.period() - other.period()).abs() < 1e-10);
     assert!(one.motion().constraint_residual().position < 1e-13);
-    // Two pairs, one of them trivial and known to the root of roundings.
+    // Two pairs, one of them trivial and known to the square root of the rounding unit.
     let angles = |orbit: &[Complex<f64>]| orbit.iter().map(|one| one.arg().abs()).fold(0.0, larger);
     assert_eq!((one.multipliers().len(), one.trivial().len()), (4, 2));
     assert!((angles(one.multipliers()) - angles(other.multipliers())).abs() < 1e-8);
@@ -579,7 +583,7 @@ fn conservative_orbits_are_those_of_fixed_size() {
         let (ours, theirs) = (ours.by(name).period(), theirs.by(name).period());
         assert!((ours - theirs).abs() < 1e-10, "{name}: {ours} {theirs}");
     }
-    // The same of a run over the period.
+    // Compared with a run over the period.
     let start = one.start();
     let run = Simulation::new(&long)
         .element(Mixed::<5>)

@@ -1,4 +1,4 @@
-//! Periodic orbits of families.
+//! Periodic orbits of models of run-time length.
 
 use crate::differences::difference;
 use crate::largest::larger;
@@ -41,7 +41,9 @@ struct DrivenSix {
     omega: f64,
 }
 
-/// Two masses have the frequencies 1 and √3. Without damping there is no orbit at the first: elements are off by 4e-6 (ten) to 9e-10 (forty) of it, and have one as large as that is small.
+/// Two masses have the frequencies 1 and √3. Forced at the first without damping, there is no periodic orbit. The
+/// errors of elements in its period, 4e-6 (ten elements) to 9e-10 (forty), allow one with an amplitude as large as
+/// these errors are small: it must be refused.
 #[test]
 fn resonance_without_damping_has_no_orbit() {
     let driven = Driven {
@@ -67,7 +69,7 @@ fn resonance_without_damping_has_no_orbit() {
     }
 }
 
-/// The same without force: conservative.
+/// The same without a driving force: conservative.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + b/4*(q[i+1]-q[i])^4)
@@ -88,7 +90,7 @@ struct Six {
     b: f64,
 }
 
-/// How far each number is from the nearest of the others.
+/// The distance of each number from the nearest of the others.
 fn apart(ones: &[Complex<f64>], others: &[Complex<f64>]) -> f64 {
     let nearest = |one: &Complex<f64>| {
         let distances = others.iter().map(|other| (one - other).norm());
@@ -167,7 +169,7 @@ fn conservative_orbits_are_those_of_fixed_size() {
             .expect("an orbit");
         assert!((one.period() - other.period()).abs() < 1e-10);
         if phase != Phase::Orthogonal {
-            // Else the phases may differ: corrections are not the same.
+            // Otherwise the phases may differ, since the corrections do.
             for a in 0..6 {
                 assert!((one.start().q[a] - other.start().q[a]).abs() < 1e-10);
             }
@@ -184,7 +186,7 @@ fn conservative_orbits_are_those_of_fixed_size() {
         let unfolding = one.unfolding().expect("unfolded");
         assert!(unfolding.abs() < 1e-8, "{unfolding:e}");
     }
-    // A given period instead of a given energy.
+    // With a given period instead of a given energy.
     let one = PeriodicOrbit::of(&long)
         .period(6.6)
         .guess_from(start)
@@ -205,7 +207,7 @@ fn conservative_orbits_are_those_of_fixed_size() {
     assert!(off.abs() < 1e-10, "{off:e}");
 }
 
-/// A linear chain: the steady state by a linear system, multipliers e^λT with λ² + cλ + ω_k² = 0.
+/// A linear chain: the steady state from a linear system, multipliers e^λT with λ² + cλ + ω_k² = 0.
 #[test]
 fn linear_chains_have_a_closed_form() {
     let (n, c, f, omega) = (20, 0.1, 1.0, 0.7);
@@ -227,7 +229,7 @@ fn linear_chains_have_a_closed_form() {
             (orbit.start().q[a] - q).abs(),
             (orbit.start().p[a] - p).abs(),
         );
-        // Order ten: (ω_max h)¹⁰ is 10⁻⁵, with a small factor, for the fastest modes, which move little.
+        // Order ten: (ω_max h)¹⁰ is 10⁻⁵, with a small factor, for the fastest modes, whose amplitudes are small.
         assert!(off < 1e-10, "{a}: {off:e}");
     }
     let mut expected = Vec::new();
@@ -242,11 +244,11 @@ fn linear_chains_have_a_closed_form() {
     let off = apart(orbit.multipliers(), &expected);
     assert!(off < 1e-8, "{off:e}");
     assert!(matches!(orbit.verdict(), Verdict::Stable { .. }));
-    // Linear: one correction, and one that finds nothing to do.
+    // A linear problem: one correction, and one that confirms it.
     assert!(orbit.statistics().newton_iterations <= 3);
 }
 
-/// T = 2π / agm(√(1 + b a²), √(1 + b a²/2)) of a'' = −a − b a³ with an amplitude.
+/// The period T = 2π / agm(√(1 + b a²), √(1 + b a²/2)) of a'' = −a − b a³ for an amplitude.
 fn duffing_period(b: f64, a: f64) -> f64 {
     let (mut mean, mut geometric) = ((1.0 + b * a * a).sqrt(), (1.0 + b * a * a / 2.0).sqrt());
     for _ in 0..6 {
@@ -255,7 +257,7 @@ fn duffing_period(b: f64, a: f64) -> f64 {
     TAU / mean
 }
 
-/// Of 20 masses the seventh mode is exact: (a, a, 0, −a, −a, 0, …) moves as a Duffing oscillator, a'' = −a − b a³.
+/// The seventh mode of 20 masses is exact: (a, a, 0, −a, −a, 0, …) moves as a Duffing oscillator, a'' = −a − b a³.
 #[test]
 fn a_mode_of_twenty_masses_has_a_closed_form() {
     let (b, a) = (1.0, 0.6);
@@ -278,18 +280,18 @@ fn a_mode_of_twenty_masses_has_a_closed_form() {
     for (found, given) in orbit.start().q.iter().zip(&start.q) {
         assert!((found - given).abs() < 1e-8, "{found} {given}");
     }
-    // Symplectic: multipliers in pairs μ, 1/μ.
+    // Symplectic: multipliers come in pairs μ, 1/μ.
     let logs: f64 = orbit.floquet().iter().map(|one| one.log_modulus).sum();
     assert!(logs.abs() < 1e-9, "{logs:e}");
     let inverses: Vec<Complex<f64>> = orbit.multipliers().iter().map(Complex::inv).collect();
     let off = apart(orbit.multipliers(), &inverses);
     assert!(off < 1e-6, "{off:e}");
-    // A bush of modes that others leave.
+    // The exact mode is unstable against other modes.
     assert!(matches!(orbit.verdict(), Verdict::Unstable { .. }));
     assert_eq!(orbit.multipliers().len(), 40);
 }
 
-/// A chain of van der Pol oscillators: an isolated orbit of unknown period.
+/// A chain of van der Pol oscillators: an isolated orbit with unknown period.
 #[dynamics(
     coordinates(x[n]), momenta(p[n]),
     hamiltonian = sum(i in 0..n, p[i]^2/2 + x[i]^2/2) + sum(i in 0..n-1, k/2*(x[i+1]-x[i])^2),
@@ -326,7 +328,7 @@ fn isolated_orbits_of_unknown_period() {
         .guess_from(guess)
         .solve()
         .expect("an orbit");
-    // All move together, with the period of a single one, by any table.
+    // All move together with the period of a single oscillator, with any quadrature.
     assert!(
         (orbit.period() - 6.663_286_859_323_13).abs() < 1e-9,
         "{}",
@@ -348,7 +350,7 @@ fn isolated_orbits_of_unknown_period() {
     assert!(off < 1e-10, "{off:e}");
 }
 
-/// One element or two of high degree: the phase stays that of the guess here too.
+/// One or two elements of high degree: here too, the phase remains that of the guess.
 #[test]
 fn one_element_or_two_over_a_period() {
     let model = VanDerPol {
@@ -360,7 +362,7 @@ fn one_element_or_two_over_a_period() {
         index: 0,
         value: 0.0,
     };
-    // Of 11 Gauss points each: the periods are 6.300093 and 6.298876885.
+    // With 11 Gauss points each, the periods are 6.300093 and 6.298876885.
     let period = 6.298_876_714;
     for (elements, tolerance) in [(1, 4e-4), (2, 1e-7)] {
         for phase in [Phase::Orthogonal, turning] {
@@ -377,7 +379,8 @@ fn one_element_or_two_over_a_period() {
             assert_eq!(few.trivial().len(), 1);
         }
     }
-    // Both masses move alike, as a Duffing oscillator: 0.59993 where one element has its turning point, with the period off by 1.4e-5.
+    // Both masses move alike as a Duffing oscillator: 0.59993 if one element has its turning point inside, with an
+    // error of the period of 1.4e-5.
     let (chain, a) = (Chain { n: 2, b: 0.5 }, 0.6);
     let period = duffing_period(chain.b, a);
     let energy = a * a + chain.b * a.powi(4) / 2.0;
@@ -400,7 +403,7 @@ fn one_element_or_two_over_a_period() {
     }
 }
 
-/// As for models of fixed size: where one is found it is the limit cycle, whose amplitude is 2.
+/// As for models of fixed size: if an orbit is found it is the limit cycle, whose amplitude is 2.
 #[test]
 fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
     let chain = Chain { n: 3, b: 0.1 };
@@ -443,7 +446,8 @@ fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
     }
 }
 
-/// The derivatives of two orbits, one of run-time length, by a parameter or by the period; multipliers in the same order.
+/// The derivatives of two orbits, one of them of run-time length, by a parameter or by the period; multipliers in the
+/// same order.
 #[track_caller]
 fn compare_slopes<const N: usize>(
     long: &OrbitSlopes<0, RunTimeLength>,
@@ -501,11 +505,12 @@ fn derivatives_of_orbits_are_those_of_fixed_size() {
     let other = other.solve_sensitive().expect("an orbit");
     assert!(one.by_period().is_none());
     compare_slopes(one.by("mu"), other.by("mu"), 1e-9);
-    // All move together: springs in between do nothing to the orbit.
+    // All move together: the springs between them have no effect on the orbit.
     assert!(one.by("k").period().abs() < 1e-10);
 }
 
-/// T = 2π / agm(√(1 + b a²), √(1 + b a²/2)) of the mode (a, a, 0, −a, −a, 0, …) at its energy of 14 moving masses: 7 a² + 3.5 b a⁴ for each, as of ä = −a − b a³.
+/// The period T = 2π / agm(√(1 + b a²), √(1 + b a²/2)) of the mode (a, a, 0, −a, −a, 0, …) with the energy of its 14
+/// moving masses: 7 a² + 3.5 b a⁴ in all, for ä = −a − b a³.
 #[test]
 fn a_period_changes_at_one_energy_as_its_closed_form() {
     let chain = Chain { n: 20, b: 1.0 };
@@ -522,7 +527,7 @@ fn a_period_changes_at_one_energy_as_its_closed_form() {
         })
         .solve_sensitive()
         .expect("an orbit");
-    // The energy of one oscillator, a²/2 + b a⁴/4, stays: a² = (√(1 + 4 b E) − 1)/b.
+    // The energy of one oscillator, a²/2 + b a⁴/4, is constant: a² = (√(1 + 4 b E) − 1)/b.
     let energy = 0.18 + 0.36 * 0.36 / 4.0;
     let at_energy = |b: f64| {
         let square = ((1.0 + 4.0 * b * energy).sqrt() - 1.0) / b;
@@ -531,7 +536,7 @@ fn a_period_changes_at_one_energy_as_its_closed_form() {
     let [expected] = difference(|b| [at_energy(b)], 1.0);
     let off = orbit.by("b").period() - expected;
     assert!(off.abs() < 1e-9, "{off:e}");
-    // The start is a turning point of amplitude a(b).
+    // The initial state is a turning point with the amplitude a(b).
     let square = |b: f64| ((1.0 + 4.0 * b * energy).sqrt() - 1.0) / b;
     let by_b = (square(1.0 + 1e-5) - square(1.0 - 1e-5)) / (2e-5) / 1.2;
     let off = orbit.by("b").start().q[0] - by_b;
@@ -584,7 +589,7 @@ fn what_makes_no_sense_is_told() {
         .solve()
         .expect_err("no sites");
     assert!(matches!(error, OrbitError::Family(_)), "{error}");
-    // Rest is an orbit of any period: its multipliers are those of the linear modes.
+    // The equilibrium is an orbit with any period: its multipliers are those of the linear modes.
     let rest = PeriodicOrbit::of(&chain).period(1.0).solve().expect("rest");
     assert!(rest.unfolding().is_none() && rest.trivial().is_empty());
     assert!(matches!(rest.verdict(), Verdict::Neutral { .. }));

@@ -1,4 +1,4 @@
-//! The derivative of a step of a family.
+//! The transition operator of a model of run-time length: the derivative of a step.
 
 use crate::differences;
 use crate::largest::larger;
@@ -11,7 +11,8 @@ use tfe::stability::{
     transition, transition_matrix,
 };
 
-/// Springs with a cubic part, velocities in forces, a potential that mixes velocities and coordinates, masses of their own.
+/// Springs with a cubic part, velocity-dependent forces, a potential that mixes velocities and coordinates, and
+/// different masses.
 #[dynamics(
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2 + g*q[i]^2*dot(q[i])^2) + sum(i in 0..n-1, b*dot(q[i])*dot(q[i+1]) + b*dot(q[i])*q[i+1])
@@ -43,7 +44,7 @@ struct WebOfFive {
     g: f64,
 }
 
-/// Masses on springs by momenta, damped.
+/// Masses on springs as a Hamiltonian, damped.
 #[dynamics(
     coordinates(q[n]), momenta(p[n]),
     hamiltonian = sum(i in 0..n, p[i]^2/2/m[i] + q[i]^4/4) + sum(i in 0..n-1, (q[i+1]-q[i])^2/2),
@@ -100,7 +101,7 @@ fn matrices_are_those_of_fixed_size() {
         let one = transition_matrix(&web, element, &start, 0.7, 0.2).expect("from the family");
         let other = transition_matrix(&five, element, &fixed, 0.7, 0.2).expect("of fixed size");
         let off = (&one - &other).amax();
-        // Entries of size one to three, some hundred operations.
+        // Entries between one and three, some hundred operations.
         assert!(off < 1e-12, "{element}: {off:e}");
         let operator = transition(&web, element, &start, 0.7, 0.2).expect("an operator");
         let (x, mut y): (Vec<f64>, _) = ((0..10).map(|k| f64::from(k).cos()).collect(), [0.0; 10]);
@@ -121,7 +122,7 @@ fn matrices_are_those_of_fixed_size() {
     }
 }
 
-/// The end of one step from a state shifted by `shift` times the direction `k`.
+/// The end of one step from a state shifted by `shift` in the direction `k`.
 fn end<M: family::Model>(
     model: &M,
     element: Element,
@@ -142,7 +143,7 @@ fn end<M: family::Model>(
     [state.p, state.q].concat()
 }
 
-/// Of fourth order: errors of 1e-12 from truncation, 1e-13 / 1e-3 from rounding.
+/// Differences of fourth order: errors of 1e-12 from truncation, 1e-13 / 1e-3 from rounding.
 fn difference(end: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
     let d = 1e-3;
     let ends = [end(d), end(-d), end(2.0 * d), end(-2.0 * d)];
@@ -188,7 +189,7 @@ fn check_derivatives<M: family::Model>(model: &M, start: &FamilyState, element: 
         .iter()
         .zip(&ends)
     {
-        // Two iterations, one solution.
+        // Two iterations, and the same solution.
         assert!((one - other).abs() < 1e-13);
     }
 }
@@ -213,7 +214,7 @@ struct Oscillator {
     c: f64,
 }
 
-/// The largest radius among the modes.
+/// The largest spectral radius of all modes.
 fn largest_of_modes(chain: &Harmonic, element: Element, h: f64) -> f64 {
     let radius = |mode: usize| {
         let angle = mode as f64 * std::f64::consts::PI / (2.0 * (chain.n + 1) as f64);
@@ -229,7 +230,7 @@ fn largest_of_modes(chain: &Harmonic, element: Element, h: f64) -> f64 {
     (1..=chain.n).map(radius).fold(0.0, larger)
 }
 
-/// The radius of a step of `n` sites is that of the worst of their modes.
+/// The spectral radius of a step of `n` sites is the largest of those of their modes.
 fn check_radius(n: usize, c: f64, element: Element, h: f64) {
     let chain = Harmonic {
         n,
@@ -247,13 +248,13 @@ fn check_radius(n: usize, c: f64, element: Element, h: f64) {
     assert!((expected > 1.0) == (c == 0.0));
 }
 
-/// ω h up to 3.4, unstable from √10 to √12: the worst modes lie together at the end of the spectrum.
+/// ω h up to 3.4, unstable from √10 to √12: the most unstable modes are close together at the end of the spectrum.
 #[test]
 fn the_radius_of_the_fastest_modes() {
     check_radius(400, 0.0, Element::primal(3), 0.85);
 }
 
-/// Some eighty modes around ω h = 3.3, of frequencies up to ω h = 4.8.
+/// About eighty modes around ω h = 3.3, with frequencies up to ω h = 4.8.
 #[test]
 fn the_radius_of_one_mode_among_eighty() {
     check_radius(1000, 0.0, Element::primal(3), 1.2);
@@ -266,7 +267,8 @@ fn the_radii_of_damped_modes() {
     }
 }
 
-/// All eigenvalues of a stable symplectic step lie on the circle: what is found lies there to its residual, or it is said that nothing was found.
+/// All eigenvalues of a stable symplectic step lie on the unit circle: the computed ones lie there up to their
+/// residuals, or there is an error that none were found.
 #[test]
 fn stable_symplectic_steps_have_no_largest_eigenvalue() {
     let chain = Harmonic {
@@ -295,7 +297,7 @@ fn stable_symplectic_steps_have_no_largest_eigenvalue() {
     let rest = short.state(vec![0.0; 20], vec![0.0; 20]);
     let matrix = transition_matrix(&short, Mixed::<4>, &rest, 0.0, 0.5).expect("a matrix");
     assert!(symplecticity_defect(&matrix) < 1e-14);
-    // A short one is exhausted.
+    // For a short chain the Krylov space is exhausted.
     let step = transition(&short, Mixed::<4>, &rest, 0.0, 0.5).expect("an operator");
     let found = dominant(&step, Iteration::default()).expect("forty eigenvalues");
     assert!((found.radius() - 1.0).abs() < 1e-12, "{found:?}");
@@ -328,7 +330,7 @@ fn what_is_impossible_is_told() {
     assert!(matches!(error, OperatorError::Family(_)), "{error}");
 }
 
-/// An impulse is taken away where time goes back, and constraints take up what is against them of that.
+/// Backwards in time, an impulse is subtracted, and constraints react to the part of it that violates them.
 #[test]
 fn derivatives_go_back_across_impulses() {
     #[dynamics(
@@ -363,11 +365,12 @@ fn derivatives_go_back_across_impulses() {
     let found = [found.q[0], found.q[1], found.p[0], found.p[1]];
     let apart = |(a, b): (&f64, &f64)| (a - b).abs();
     let off = found.iter().zip(&expected).map(apart).fold(0.0, larger);
-    // Differences leave some 1e-13 of the largest derivative, which is about one.
+    // Differences have errors of about 1e-13 of the largest derivative, which is about one.
     assert!(off < 1e-10, "{found:?} {expected:?}");
 }
 
-/// Where a motion comes to rest its momentum is roundings, which are no other root, in whatever units.
+/// Where a motion comes to rest its momentum is a rounding error: this must not be taken for another root, in whatever
+/// units.
 #[test]
 fn derivatives_end_where_a_motion_comes_to_rest() {
     use std::f64::consts::PI;
@@ -385,7 +388,7 @@ fn derivatives_end_where_a_motion_comes_to_rest() {
             q: vec![size],
             p: vec![0.0],
         };
-        // Over half a period (p, q) becomes (−p, −q): roundings of fifty steps are left.
+        // During half a period (p, q) becomes (−p, −q): the rounding errors of fifty steps remain.
         let linearised = run.run_linearised(start.clone(), 0.0..PI);
         let product = linearised.expect("a run").product();
         let off = [
@@ -396,7 +399,7 @@ fn derivatives_end_where_a_motion_comes_to_rest() {
         ];
         let off = off.iter().map(|entry| entry.abs()).fold(0.0, larger);
         assert!(off < 1e-12, "{size:e}: {off:e}");
-        // p = −a √k sin √k t, of which ∂p/∂k = a π/2 is there.
+        // p = −a √k sin √k t, whose derivative ∂p/∂k is a π/2 there.
         let sensitive = run.run_sensitive(start, 0.0..PI).expect("a run");
         let by = sensitive.by("k").last();
         let off = by.p[0] / size - PI / 2.0;

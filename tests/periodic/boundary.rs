@@ -1,4 +1,4 @@
-//! Boundary-value problems against closed forms, and assembled initial-value problems against steps.
+//! Boundary-value problems compared with closed forms, and assembled initial-value problems compared with steps.
 
 use crate::models::{Duffing, HenonHeiles, Mathieu, Pendulum, Projectile};
 use std::f64::consts::PI;
@@ -32,12 +32,12 @@ fn a_projectile_between_two_points() {
             let y = 2.0 + vy * s - 0.5 * 9.81 * s * s;
             assert!((node.q[0] - (1.0 + vx * s)).abs() < 1e-13 && (node.q[1] - y).abs() < 1e-13);
         }
-        // Linear: the first correction is the solution, the second sees it.
+        // A linear problem: the first correction is the solution, and the second one confirms it.
         assert!(arc.statistics().newton_iterations <= 3);
     }
 }
 
-/// sn(u, k) by descending Landen transformations.
+/// The elliptic function sn(u, k) by descending Landen transformations.
 fn sn(u: f64, k: f64) -> f64 {
     if k < 1e-9 {
         return u.sin();
@@ -48,8 +48,8 @@ fn sn(u: f64, k: f64) -> f64 {
     (1.0 + k1) * s / (1.0 + k1 * s * s)
 }
 
-/// From hanging at rest at the bottom… to the top it is a heteroclinic orbit; with a finite time to θ = π a push is needed: p₀ = 2/k, and
-/// θ(t) = 2 asin sn(t/k, k) reaches π at t = k K(k).
+/// The motion from rest at the bottom to the top would take an infinite time (heteroclinic orbit). To reach θ = π in a
+/// finite time, an initial momentum is needed: p₀ = 2/k, and θ(t) = 2 asin sn(t/k, k) reaches π at t = k K(k).
 #[test]
 fn a_pendulum_swings_up() {
     let pendulum = Pendulum {};
@@ -75,7 +75,8 @@ fn a_pendulum_swings_up() {
         assert!((node.q[0] - 2.0 * sn(t / k, k).asin()).abs() < 1e-12);
         assert!((motion.at(t).expect("inside").q[0] - node.q[0]).abs() < 1e-10);
     }
-    // Swinging back first is another solution of the same problem for a longer time; the guess decides.
+    // Swinging back first is another solution of the same problem for a longer time; the guess determines which one is
+    // found.
     let long = |guess: f64| {
         BoundaryValue::of(&pendulum)
             .element(Mixed::<6>)
@@ -98,7 +99,7 @@ fn a_pendulum_swings_up() {
     }
 }
 
-/// Released from rest (p = 0) at an unknown angle, at the bottom after a quarter period 1.8 > π/2.
+/// Released from rest (p = 0) at an unknown angle, and at the bottom after a quarter period 1.8 > π/2.
 #[test]
 fn coordinates_and_momenta_mixed() {
     let pendulum = Pendulum {};
@@ -112,7 +113,7 @@ fn coordinates_and_momenta_mixed() {
         .solve()
         .expect("a quarter of a swing");
     let amplitude = arc.start().q[0];
-    // K(sin θ₀/2) = 1.8 by the arithmetic–geometric mean.
+    // K(sin θ₀/2) = 1.8, by the arithmetic–geometric mean.
     let (mut a, mut b) = (1.0, (0.5 * amplitude).cos());
     for _ in 0..8 {
         (a, b) = (0.5 * (a + b), (a * b).sqrt());
@@ -185,7 +186,7 @@ fn an_assembled_initial_value_problem_is_stepping() {
     }
 }
 
-/// Of weights and a number of elements the last call counts.
+/// If weights and a number of elements are both given, the last call counts.
 #[test]
 fn a_number_of_elements_takes_the_place_of_weights() {
     let (projectile, pendulum) = (Projectile { g: 9.81 }, Pendulum {});
@@ -212,7 +213,8 @@ fn a_number_of_elements_takes_the_place_of_weights() {
     }
 }
 
-/// The motion reaches the end of its span to the last bit, forwards and backwards, where 0.2 + (0.9 − 0.2) does not.
+/// The motion reaches the end of its span to the last bit, forwards and backwards in time, although 0.2 + (0.9 − 0.2)
+/// does not in floating-point arithmetic.
 #[test]
 fn motions_end_where_they_were_asked_to() {
     let projectile = Projectile { g: 9.81 };
@@ -231,8 +233,9 @@ fn motions_end_where_they_were_asked_to() {
     }
 }
 
-/// All motions of an oscillator from 0 come back after half a period. Elements are off by 6e-5 (two nodes) to 7e-12 (four nodes, forty elements), and reach 1 with amplitudes as large as that is
-/// small. With six nodes they are off by roundings.
+/// All motions of an oscillator from 0 return after half a period, so that no motion ends elsewhere. The errors of
+/// elements, 6e-5 (two nodes) to 7e-12 (four nodes, forty elements), allow solutions that end at 1 with amplitudes as
+/// large as these errors are small: they must be refused. With six nodes, errors are rounding errors.
 #[test]
 fn conjugate_points_have_no_motion_between_them() {
     let oscillator = Mathieu { a: 1.0, q: 0.0 };
@@ -254,14 +257,16 @@ fn conjugate_points_have_no_motion_between_them() {
             error.map(|arc| arc.start())
         );
     }
-    // Near by amplitudes are large, and right as far as elements are: 7e-12 of the 1e-4 that are missing.
+    // At a nearby time amplitudes are large, and as accurate as elements are: 7e-12 relative to the distance of 1e-4
+    // from half a period.
     let end = PI - 1e-4;
     let arc = between(Element::mixed(4), 40, end).expect("an arc");
     let off = arc.start().p[0] * end.sin() - 1.0;
     assert!(off.abs() < 3e-7, "{off:e}");
 }
 
-/// In a short time momenta hardly move a body, as those of a heavy one do: they are as large as that is small.
+/// Within a short time momenta hardly move a body, and even less a heavy one: the solution has large momenta all the
+/// same.
 #[test]
 fn a_projectile_in_a_short_time() {
     let projectile = Projectile { g: 9.81 };
@@ -272,7 +277,7 @@ fn a_projectile_in_a_short_time() {
             .solve()
             .unwrap_or_else(|error| panic!("{time:e}: {error}"));
         let State { p: [vx, vy], .. } = arc.start();
-        // Beside them weight is nothing.
+        // Compared with these, the weight is negligible.
         assert!((vx * time / 10.0 - 1.0).abs() < 1e-13, "{time:e}: {vx:e}");
         assert!((vy * time / 2.0 - 1.0).abs() < 1e-13, "{time:e}: {vy:e}");
     }

@@ -1,11 +1,11 @@
-//! Branches of periodic orbits that come to rest, and in units of any size.
+//! Branches of periodic orbits that end at rest, and in units of any size.
 
 use crate::continuation::{Pendulum, close, kinds};
 use std::f64::consts::TAU;
 use tfe::continuation::{Branch, ContinuationErrorKind, End, EventKind};
 use tfe::prelude::*;
 
-/// An oscillator that hardens, and beside it a linear one, damped, whose force is in other units.
+/// A hardening oscillator, and next to it a linear one, damped, with a force in other units.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2 - x^2/2 - x^4/4 - 20*y^2,
@@ -19,7 +19,7 @@ struct Beside {
     omega: f64,
 }
 
-/// Orbits of one energy, or of one period, shrink to the pendulum that hangs still. Beyond it there are none.
+/// Orbits of given energy, or of given period, shrink to the pendulum at rest. There are none beyond it.
 #[test]
 fn branches_end_where_their_orbits_come_to_rest() {
     let pendulum = Pendulum { k: 1.0 };
@@ -47,7 +47,7 @@ fn branches_end_where_their_orbits_come_to_rest() {
     }
 }
 
-/// The response of both over ω, from one side of the resonance of the first towards the other.
+/// The response of both over ω, from one side of the resonance of the first one to the other.
 fn response(large: f64, end: f64) -> Branch<Beside, 2> {
     let model = Beside { large, omega: 0.8 };
     Continuation::of(&model)
@@ -65,7 +65,8 @@ fn response(large: f64, end: f64) -> Branch<Beside, 2> {
         .unwrap_or_else(|error| panic!("{large:e}, {end}: {error}"))
 }
 
-/// Folds are where they are whatever moves beside the oscillator: in arc length both count by their own sizes.
+/// Folds do not depend on what moves next to the oscillator: in the arc length, each coordinate is scaled by its own
+/// size.
 #[test]
 fn folds_of_small_coordinates_are_found_beside_large_ones() {
     let alone = response(0.0, 3.5);
@@ -75,13 +76,14 @@ fn folds_of_small_coordinates_are_found_beside_large_ones() {
         assert_eq!(kinds(&branch), [EventKind::Fold, EventKind::Fold]);
         assert_eq!(branch.end(), Some(End::Range));
         for (fold, expected) in branch.events().iter().zip(alone.events()) {
-            // Both are found to roundings, times the condition of the equations at folds.
+            // Both are found up to rounding errors, times the condition number of the equations at folds.
             close(fold.point.parameter, expected.point.parameter, 1e-9);
         }
     }
 }
 
-/// A branch that leaves the range just before a fold, and one that begins there and comes back: within a step both are inside again.
+/// A branch that leaves the range just before a fold, and one that begins there and returns: both are inside the range
+/// again within one step.
 #[test]
 fn branches_end_at_bounds_beside_folds() {
     let whole = response(0.0, 3.5);
@@ -108,12 +110,12 @@ fn branches_end_at_bounds_beside_folds() {
     close(round.events()[0].point.parameter, fold, 1e-9);
     let end = &round.points()[round.points().len() - 1];
     assert_eq!(end.parameter, bound);
-    // The other orbit of this frequency: some root of 1e-4 away.
+    // The other orbit with this frequency: the amplitudes differ by the order of the square root of 1e-4.
     close(round.points()[0].amplitudes[0], start.amplitudes[0], 1e-9);
     assert!((end.amplitudes[0] - start.amplitudes[0]).abs() > 1e-4);
 }
 
-/// The period by the parameter, where a small part of the range reaches beyond a pole.
+/// The derivative of the period by the parameter, where a small part of the range extends beyond a pole.
 #[test]
 fn periods_change_as_they_do_beside_poles() {
     let omega = 0.5;
@@ -135,7 +137,7 @@ fn periods_change_as_they_do_beside_poles() {
     close(slope * omega * omega / TAU, -1.0, 1e-8);
 }
 
-/// A first step that is longer than a twentieth of the range is made; one that contradicts the others is told.
+/// A first step longer than a twentieth of the range is made; one that contradicts the other settings is an error.
 #[test]
 fn the_first_step_is_the_one_that_was_asked_for() {
     let model = Beside {
@@ -151,7 +153,7 @@ fn the_first_step_is_the_one_that_was_asked_for() {
     };
     let branch = continuation().step(0.2).max_points(2).run();
     let branch = branch.expect("a branch");
-    // Of arc length, in which the small response x = −1/2 cos(ωt)/(ω² − 1) counts a tenth: 0.19.
+    // In arc length, where the small response x = −1/2 cos(ωt)/(ω² − 1) is scaled to a tenth: 0.19.
     let step = branch.points()[1].parameter - 5.0;
     assert!((0.15..0.2).contains(&step), "{step}");
     for (step, smallest, largest) in [(0.2, 1e-3, 0.1), (0.01, 0.02, 0.1), (0.1, 0.2, 0.05)] {

@@ -1,4 +1,4 @@
-//! Orbits of constrained models against those of their twins in minimal coordinates.
+//! Orbits of constrained models compared with those of equivalent models in minimal coordinates.
 
 use crate::common::larger;
 use std::f64::consts::{PI, TAU};
@@ -10,7 +10,8 @@ use tfe::prelude::*;
 
 const OMEGA: f64 = 2.3;
 
-/// A pendulum whose pivot moves up and down, with air drag and a driving torque; φ from the downward vertical.
+/// A pendulum with a pivot that moves up and down, air drag and a driving torque; φ is measured from the downward
+/// vertical.
 #[dynamics(
     coordinates(phi),
     let x = sin(phi),
@@ -27,7 +28,7 @@ struct Angle {
     c: f64,
 }
 
-/// The same as a mass on a rod. The torque acts as the force f cos ωt and −c φ̇ across the rod.
+/// The same as a mass on a rod. The torque acts as the force f cos ωt and −c φ̇ perpendicular to the rod.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
@@ -61,12 +62,12 @@ fn mass(model: &Angle, t: f64, phi: f64, rate: f64) -> ([f64; 2], [f64; 2]) {
     )
 }
 
-/// Multipliers of both, each from 40 elements of six nodes; they are the same to 1e-9.
+/// The multipliers of both, each from 40 elements of six nodes; they agree to 1e-9.
 #[test]
 fn forced_orbits_have_the_multipliers_of_their_twins() {
     for (a, f, c) in [(0.1, 0.2, 0.1), (0.3, 0.0, 0.0), (0.0, 0.8, 0.05)] {
         let (angle, rod) = twins(a, f, c);
-        // The linear response as a guess.
+        // The linear response is the guess.
         let amplitude = f / (1.0 - OMEGA * OMEGA);
         let curve = |t: f64| {
             let (sin, cos) = (OMEGA * t).sin_cos();
@@ -113,7 +114,7 @@ struct Free {
     g: f64,
 }
 
-/// A conservative swing: the period follows from the energy, and both trivial multipliers are one.
+/// A conservative swing: the period follows from the energy, and the two trivial multipliers are one.
 #[test]
 fn a_free_swing() {
     let (angle, rod) = (twins(0.0, 0.0, 0.0).0, Free { g: 1.0 });
@@ -143,12 +144,12 @@ fn a_free_swing() {
     assert!((highest + amplitude.cos()).abs() < 1e-6, "{highest}");
     assert_eq!(orbit.multipliers().len(), 2);
     for multiplier in orbit.multipliers() {
-        // Double and defective: the square root of the error.
+        // A double, defective eigenvalue: its error is the square root of that of the matrix.
         assert!((multiplier - 1.0).norm() < 1e-5, "{multiplier}");
     }
 }
 
-/// A pendulum that is held twice: with l = 1 the second equation follows from the first.
+/// A pendulum with two constraints: with l = 1 the second equation follows from the first.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
@@ -160,14 +161,15 @@ struct Twice {
     l: f64,
 }
 
-/// A swing of a pendulum of length one through the bottom, where rows have their lengths to the last bit.
+/// A swing of a pendulum of length one through the bottom, where the rows of both constraints have equal lengths to the
+/// last bit.
 fn swing(amplitude: f64, omega: f64, t: f64) -> ([f64; 2], [f64; 2]) {
     let angle = twins(0.0, 0.0, 0.0).0;
     let (sin, cos) = (omega * t).sin_cos();
     mass(&angle, t, amplitude * sin, amplitude * omega * cos)
 }
 
-/// Elements keep the first of two rows that are one: the other one is off by a tenth of the length.
+/// If two rows are equal, elements use the first: here the other constraint is violated by a tenth of the length.
 #[track_caller]
 fn assert_violated(error: &AssemblyError) {
     let AssemblyError::Violated {
@@ -232,7 +234,7 @@ fn constraints_that_contradict_have_no_motion_between_ends() {
     }
 }
 
-/// Two elements of a period: their nodes do not tell the flow, and reactions belong to it.
+/// With two elements per period, their nodes do not determine the direction of the flow, and reactions are part of it.
 #[test]
 fn a_free_swing_of_two_elements() {
     let rod = Free { g: 1.0 };
@@ -250,7 +252,8 @@ fn a_free_swing_of_two_elements() {
     assert!(off.abs() < 1e-4, "{off:e}");
 }
 
-/// A body about a fixed point, by a unit quaternion, whose mass matrix is singular: it swings about its first axis, as a pendulum in one angle does. A spring keeps its axis from turning about the vertical.
+/// A body with a fixed point, described by a unit quaternion, with a singular mass matrix: it swings about its first
+/// axis like a pendulum in one angle. A spring prevents rotation about the vertical.
 #[test]
 fn a_swing_of_a_unit_quaternion() {
     #[dynamics(
@@ -286,7 +289,7 @@ fn a_swing_of_a_unit_quaternion() {
     let theirs = theirs.guess_from(plane.state([angle], [0.0]));
     let (ours, theirs) = (ours.solve_sensitive(), theirs.solve_sensitive());
     let (ours, theirs) = (ours.expect("an orbit"), theirs.expect("an orbit"));
-    // The elements are other ones in other coordinates: of tenth order.
+    // The elements differ, since the coordinates do: errors of tenth order.
     let (one, other) = (ours.orbit(), theirs.orbit());
     assert!((one.period() - other.period()).abs() < 1e-7);
     assert_eq!((one.multipliers().len(), one.trivial().len()), (6, 2));
@@ -296,7 +299,7 @@ fn a_swing_of_a_unit_quaternion() {
     }
 }
 
-/// A driven pendulum whose mass is another one upwards: which momenta the rod allows depends on m.
+/// A driven pendulum with a different mass in the vertical direction: the momenta that the rod allows depend on m.
 #[dynamics(
     coordinates(x, y),
     lagrangian = (dot(x)^2 + m*dot(y)^2)/2 - y,
@@ -360,7 +363,7 @@ fn a_table_of_a_branch_has_a_column_for_each_multiplier() {
     branch.write_csv(&path).expect("written");
     let text = std::fs::read_to_string(&path).expect("read");
     std::fs::remove_file(&path).expect("removed");
-    // The parameter, the period, two amplitudes, two multipliers, and whether it is stable.
+    // The parameter, the period, two amplitudes, two multipliers, and the stability.
     for line in text.lines() {
         assert_eq!(line.split(',').count(), 9, "{line}");
     }

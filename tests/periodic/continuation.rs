@@ -1,4 +1,5 @@
-//! Branches of periodic orbits: folds, doublings, tori, and agreement with orbits that are solved one by one.
+//! Branches of periodic orbits: folds, period doublings, torus bifurcations, and agreement with orbits that are solved
+//! one by one.
 
 use crate::common::larger;
 use nalgebra::Complex;
@@ -86,9 +87,10 @@ fn both_folds_of_a_hardening_resonance() {
     assert_eq!(coarse.end(), Some(End::Range));
     assert_eq!(kinds(&fine), kinds(&coarse));
     for (coarse, fine) in coarse.events().iter().zip(fine.events()) {
-        // Eighth order: 2π/40 to the eighth is 4e-7, with the small constant of five nodes below 1e-11.
+        // Eighth order: (2π/40)⁸ is 4e-7, and with the small constant of five nodes the error is below 1e-11.
         close(coarse.point.parameter, fine.point.parameter, 1e-10);
-        // The place is found from dλ/ds, which is linear there as 1 − μ is. From λ alone, flat there, it would be known to the root of round-off.
+        // The fold is found as the zero of dλ/ds, which is linear there, as is 1 − μ. From λ alone, which has an
+        // extremum there, it would be known to the square root of the rounding unit only.
         close(fine.point.multipliers[0].re, 1.0, 1e-11);
         close(fine.point.tangent.parameter, 0.0, 1e-11);
         assert!(fine.width < 1e-12);
@@ -122,7 +124,7 @@ fn orbits_of_a_branch_are_those_solved_one_by_one() {
             .guess_from(point.start)
             .solve()
             .expect("an orbit");
-        // Newton's tolerance, times the sensitivity near folds.
+        // The tolerance of Newton's method, times the sensitivity near folds.
         close(alone.start().q[0], point.start.q[0], 1e-11);
         close(alone.start().p[0], point.start.p[0], 1e-11);
         assert_eq!(alone.multipliers().len(), orbit.multipliers().len());
@@ -134,7 +136,8 @@ fn orbits_of_a_branch_are_those_solved_one_by_one() {
             let t = point.period * f64::from(k) / 2000.0;
             largest.at(t).expect("in the period").q[0]
         });
-        // The symmetric response: half the range is the maximum. 2000 places miss it by (2π/2000)²/8 of it.
+        // The response is symmetric: half of the range is the maximum. The largest of 2000 samples misses it by
+        // (2π/2000)²/8 of it.
         close(largest.fold(0.0, larger), point.amplitudes[0], 4e-6);
     }
     assert!(branch.orbit(branch.points().len()).is_none());
@@ -166,10 +169,10 @@ fn the_tangent_is_the_derivative_of_solved_orbits() {
         point.tangent.start.q[0] / slope,
         point.tangent.start.p[0] / slope,
     ];
-    // A central difference: step² times a third derivative, and 1e-13 of the solution over the step.
+    // The error of a central difference: step² times a third derivative, and 1e-13 of the solution divided by the step.
     close(by_omega[0], (high.q[0] - low.q[0]) / (2.0 * step), 1e-6);
     close(by_omega[1], (high.p[0] - low.p[0]) / (2.0 * step), 1e-6);
-    // The period by a central difference as well.
+    // The derivative of the period, by a central difference as well.
     let by_omega = -TAU / point.parameter.powi(2);
     close(point.tangent.period / slope, by_omega, 1e-7);
 }
@@ -196,7 +199,8 @@ fn a_period_doubles_in_one_well() {
     let event = &branch.events()[0];
     close(event.point.multipliers[0].re, -1.0, 1e-11);
     assert!(event.width < 1e-12);
-    // Beside the event the single orbit has lost its stability to one of twice the period, which is where motions end up.
+    // Beyond the event, the orbit with the period of the force has lost its stability to one of twice the period, to
+    // which motions converge.
     let beyond = Duffing {
         f: event.point.parameter + 2e-3,
         ..well
@@ -225,7 +229,7 @@ fn a_period_doubles_in_one_well() {
     assert!(double.is_stable());
     let halfway = double.nodes()[60];
     let apart = (halfway.q[0] - double.start().q[0]).hypot(halfway.p[0] - double.start().p[0]);
-    // The distance grows as the root of 2e-3.
+    // The distance grows as the square root of 2e-3.
     assert!(apart > 1e-2, "{apart}");
 }
 
@@ -265,7 +269,7 @@ fn locking_is_lost_to_a_torus() {
     let torus = &branch.events()[0].point;
     assert!(torus.multipliers[0].im != 0.0);
     close(torus.multipliers[0].norm(), 1.0, 1e-12);
-    // Averaging for small μ: locking is lost where the amplitude is 2/√2; the correction is of order μ².
+    // By averaging for small μ, locking is lost where the amplitude is 2/√2; the correction is of order μ².
     close(torus.amplitudes[0], 2.0_f64.sqrt(), 0.2 * 0.2 * 0.1);
     let beside = |by: f64| {
         at(&ForcedVanDerPol {
@@ -301,7 +305,7 @@ fn a_symmetric_response_meets_one_that_is_not() {
     assert_eq!(kinds(&branch), [EventKind::Branch]);
     assert_eq!(kinds(&other), [EventKind::Branch]);
     let (event, again) = (&branch.events()[0], &other.events()[0]);
-    // Interpolated between other points each time.
+    // Interpolated between different points each time.
     close(event.point.parameter, again.point.parameter, 1e-9);
     assert!(event.width < 1e-7);
     close(event.point.multipliers[0].re, 1.0, 1e-9);
@@ -330,7 +334,7 @@ fn a_symmetric_response_meets_one_that_is_not() {
     };
     let [one, mirrored] = [orbit(0.05), orbit(-0.05)];
     assert!(one.is_stable() && mirrored.is_stable());
-    // A symmetric orbit is the opposite of itself after half a period; of these two each is that of the other.
+    // A symmetric orbit is its own opposite after half a period; these two are the opposites of each other.
     let [one, half, mirrored] = [one.nodes()[0], one.nodes()[30], mirrored.nodes()[0]];
     assert!((one.q[0] + half.q[0]).hypot(one.p[0] + half.p[0]) > 0.05);
     let paired =
@@ -362,10 +366,10 @@ fn a_limit_cycle_in_its_damping() {
         .solve()
         .expect("an orbit");
     assert_eq!(last.parameter, 5.0);
-    // The phases differ, and with them the places of the elements: what is left of the error of the mesh.
+    // The phases differ, and with them the positions of the elements: the difference is the error of the mesh.
     close(last.period, alone.period(), 1e-10);
     assert_eq!(last.trivial.len(), 1);
-    // The period of the first orbit by the parameter, against its neighbour's.
+    // The derivative of the period of the first orbit by the parameter, compared with its neighbour.
     let near = VanDerPol { mu: 1.0 + 1e-5 };
     let near = PeriodicOrbit::of(&near)
         .element(Mixed::<6>)
@@ -376,11 +380,12 @@ fn a_limit_cycle_in_its_damping() {
         .expect("an orbit");
     let tangent = branch.points()[0].tangent;
     let difference = (near.period() - branch.points()[0].period) / 1e-5;
-    // A difference on one side: 1e-5 times a second derivative.
+    // A one-sided difference: 1e-5 times a second derivative.
     close(tangent.period / tangent.parameter, difference, 1e-5);
 }
 
-/// The period of a pendulum of k and energy H = p²/2 − k cos θ: 2π / (√k M(1, cos A/2)), with M the arithmetic-geometric mean, cos A = −H/k.
+/// The period of a pendulum with k and the energy H = p²/2 − k cos θ: 2π / (√k M(1, cos A/2)), where M is the
+/// arithmetic–geometric mean and cos A = −H/k.
 fn pendulum_period(k: f64, energy: f64) -> f64 {
     let (mut a, mut b) = (1.0, (0.5 * (1.0 - energy / k)).sqrt());
     while a - b > 1e-15 {
@@ -405,7 +410,7 @@ fn conservative_orbits_of_one_energy_or_one_period() {
     assert!(branch.events().is_empty());
     for point in branch.points() {
         let expected = pendulum_period(point.parameter, energy);
-        // Eighth order with steps of T/40.
+        // Eighth order with elements of length T/40.
         close(point.period, expected, 1e-9);
         assert_eq!(point.trivial.len(), 2);
         assert!(point.is_stable());
@@ -425,7 +430,7 @@ fn conservative_orbits_of_one_energy_or_one_period() {
 
 #[test]
 fn a_conservative_period_doubles_at_one_energy_scaled() {
-    // With x → x/a all energies are a⁻² times those of a = 1: what counts is a² H.
+    // With x → x/a, all energies are a⁻² times those of a = 1: only a² H matters.
     let run = |size: f64, start: f64| {
         let model = HenonHeiles { a: start };
         let branch = Continuation::of(&model)
@@ -443,14 +448,14 @@ fn a_conservative_period_doubles_at_one_energy_scaled() {
         assert_eq!(kinds(&branch), [EventKind::PeriodDoubling]);
         let motion = branch.event_orbit(0).expect("an orbit").motion();
         let event = &branch.events()[0].point;
-        // Two multipliers meet at −1: known to the root of round-off.
+        // Two multipliers meet at −1: each is known to the square root of the rounding unit.
         let distances = event.multipliers.iter();
         let distances = distances.map(|one| (one + Complex::new(1.0, 0.0)).norm());
         assert!(distances.fold(f64::INFINITY, f64::min) < 1e-6);
         event.parameter.powi(2) * motion.energies()[0]
     };
     let [one, other] = [run(0.4, 0.5), run(0.3, 0.7)];
-    // ∏ (μ + 1) is known to round-off, although each μ is not.
+    // ∏ (μ + 1) is known up to rounding, although each μ is not.
     close(one, other, 1e-9);
 }
 
@@ -474,7 +479,7 @@ fn branches_run_backwards_and_end_where_asked() {
     for point in branch.points() {
         let omega = point.parameter;
         let exact = 0.5 / (1.0 - omega * omega).hypot(0.1 * omega);
-        // The parabola through three of 160 places; the orbit itself is right to 1e-8.
+        // The maximum of a parabola through three of 160 samples; the orbit itself has an error of 1e-8.
         close(point.amplitudes[0] / exact, 1.0, 1e-6);
     }
     let last = branch.points().last().expect("points");
@@ -487,7 +492,7 @@ fn branches_run_backwards_and_end_where_asked() {
     assert_eq!(short.points().len(), 5);
     assert_eq!(short.end(), Some(End::Points));
     let step = short.points()[0].parameter - short.points()[1].parameter;
-    // The first step is one of the parameter, up to the curvature of the branch.
+    // The first step is a step of the parameter, up to the curvature of the branch.
     close(step, 0.01 * 1.5, 1e-3);
 }
 
@@ -566,14 +571,14 @@ fn a_branch_that_stops_is_kept_so_far() {
         assert_eq!(partial.end(), None);
         parameter
     };
-    // Steps that are too long to turn at the fold.
+    // Steps that are too long to turn around at the fold.
     let long = continuation()
         .period(|duffing| TAU / duffing.omega)
         .step(0.6)
         .smallest_step(0.6)
         .largest_step(0.6);
     assert!(stopped(long) < 2.3);
-    // A period that ceases to be one.
+    // A given period that is no longer one of the equations.
     let broken = continuation().period(|duffing| {
         if duffing.omega < 1.5 {
             TAU / duffing.omega

@@ -1,11 +1,11 @@
-//! Orders of periods and multipliers in the number of elements, on nonlinear orbits; and the cost.
+//! Orders of periods and multipliers over the number of elements, for nonlinear orbits; and the cost.
 
 use crate::models::{Duffing, VanDerPol};
 use std::f64::consts::TAU;
 use tfe::periodic::Phase;
 use tfe::prelude::*;
 
-/// Errors that fall like E^{−order}; each with its number of elements.
+/// The observed order of errors that fall as E^{−order}, each with its number of elements E.
 #[track_caller]
 fn assert_order(errors: &[(usize, f64)], order: f64, what: &str) {
     for pair in errors.windows(2) {
@@ -18,7 +18,7 @@ fn assert_order(errors: &[(usize, f64)], order: f64, what: &str) {
     }
 }
 
-/// Numbers of elements for which the error of an element of so many nodes is a power, well above round-off.
+/// Numbers of elements for which the error with this number of nodes is asymptotic and well above rounding.
 fn elements(nodes: usize) -> [usize; 3] {
     match nodes {
         2 => [160, 240, 360],
@@ -96,7 +96,8 @@ fn forced_duffing_multipliers() {
     }
 }
 
-/// The work of a solve is proportional to the number of elements: the same number of iterations, each with one tangent per element and point.
+/// The work of a solution is proportional to the number of elements: the same number of iterations, each with one
+/// tangent per element and point.
 #[test]
 fn the_work_is_linear_in_the_number_of_elements() {
     let model = VanDerPol { mu: 1.0 };

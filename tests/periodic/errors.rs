@@ -1,4 +1,4 @@
-//! What makes no sense, or has no solution, is a typed error.
+//! Invalid problems, and those without a solution, are typed errors.
 
 use crate::common::larger;
 use crate::models::{Duffing, Pendulum, Projectile, VanDerPol};
@@ -64,7 +64,8 @@ fn orbits_that_are_ill_posed() {
         error,
         Err(OrbitError::Assembly(AssemblyError::Element(_)))
     ));
-    // The limit cycle has one period only: with another one the equations need a force.
+    // A limit cycle has one period only: with a given period that differs, the equations would need an additional
+    // force.
     let error = problem().period(7.5).solve();
     assert!(
         matches!(error, Err(OrbitError::NoFamily { .. })),
@@ -73,7 +74,7 @@ fn orbits_that_are_ill_posed() {
     );
 }
 
-/// Something else decides on the energy: the period, or forces.
+/// The energy is determined otherwise: by the period, or by forces.
 #[test]
 fn an_energy_that_does_not_decide_is_refused() {
     let (pendulum, cycle) = (Pendulum {}, VanDerPol { mu: 1.0 });
@@ -99,7 +100,7 @@ fn an_energy_that_does_not_decide_is_refused() {
 fn orbits_that_do_not_exist() {
     let pendulum = Pendulum {};
     let rest = PeriodicOrbit::of(&pendulum).unknown_period(6.0).solve();
-    // Every time is a period of an equilibrium: none is singled out.
+    // Every time is a period of an equilibrium, so that no period is distinguished.
     assert!(matches!(rest, Err(OrbitError::AtRest)));
     let far = VanDerPol { mu: 1.0 };
     let error = PeriodicOrbit::of(&far)
@@ -139,7 +140,8 @@ fn orbits_that_do_not_exist() {
     }
 }
 
-/// Where one is found it is the limit cycle, whose amplitude is 2: rest is none, whether the guess is there or the search is led there.
+/// If an orbit is found it is the limit cycle, whose amplitude is 2. The equilibrium must not be returned, whether the
+/// guess is there or the search leads there.
 #[test]
 fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
     let pendulum = Pendulum {};
@@ -200,7 +202,7 @@ fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
     }
 }
 
-/// With a given period it is one: see `a_saddle_of_a_simulation_is_unstable` too.
+/// With a given period, the equilibrium is an orbit: see `a_saddle_of_a_simulation_is_unstable`, too.
 #[test]
 fn multipliers_of_an_equilibrium() {
     let pendulum = Pendulum {};
@@ -273,7 +275,7 @@ fn boundary_values_that_are_ill_posed() {
         error,
         Err(BoundaryError::Mesh(MeshError::NoElements))
     ));
-    // px is conserved: giving it at both ends says nothing about x.
+    // px is conserved: giving it at both ends does not determine x.
     let error = problem()
         .span(0.0..1.0)
         .start(Component::Momentum(0), 1.0)
@@ -292,8 +294,9 @@ fn boundary_values_that_are_ill_posed() {
     assert!((solved.start().q[1] + 2.0 + 0.5 * 9.81).abs() < 1e-13);
 }
 
-/// An undamped oscillator has no orbit of the period of its own: elements are off by 4e-6 (ten) to 9e-10 (forty) of it, and have one as large as that is small. A little damping makes one, of
-/// x = f/δ sin t, which is as large and right.
+/// An undamped oscillator forced with its own period has no periodic orbit. The errors of elements in its period, 4e-6
+/// (ten elements) to 9e-10 (forty), allow an orbit with an amplitude as large as these errors are small: it must be
+/// refused. With a little damping there is one, x = f/δ sin t, which is as large, and right.
 #[test]
 fn resonance_without_damping_has_no_orbit() {
     let forced = |delta: f64| Duffing {
@@ -321,11 +324,11 @@ fn resonance_without_damping_has_no_orbit() {
     let damped = forced(1e-4);
     let orbit = PeriodicOrbit::of(&damped).period(TAU).solve();
     let start = orbit.expect("an orbit").start();
-    // 9e-10 of the phase beside 3e-4 that damping takes of the amplitude.
+    // The error of the phase is 9e-10, compared with 3e-4 by which damping reduces the amplitude.
     assert!((start.p[0] / 3000.0 - 1.0).abs() < 1e-5, "{start:?}");
 }
 
-/// What falls gains momentum: no correction changes that, and only the coordinate can be closed.
+/// A falling body gains momentum: no correction changes that, and only the coordinate can be periodic.
 #[test]
 fn motions_that_do_not_close_are_no_orbits() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + g*x)]

@@ -19,7 +19,7 @@ pub struct Duffing {
     pub omega: f64,
 }
 
-/// A rigid flapping blade in forward flight; the azimuth is the time.
+/// A rigid flapping blade in forward flight; the azimuth angle is the time.
 #[dynamics(
     coordinates(b),
     let aero = lock/8,
@@ -41,7 +41,7 @@ pub struct Mathieu {
     pub q: f64,
 }
 
-/// A shaft with unequal stiffnesses that turns at Ω, in the fixed frame.
+/// A shaft with unequal stiffnesses that rotates at Ω, in the fixed frame.
 #[dynamics(
     coordinates(x, y),
     let k0 = (w1^2 + w2^2)/2,
@@ -55,9 +55,10 @@ pub struct Shaft {
     pub omega: f64,
 }
 
-/// A saddle and a damped oscillator, mixed by a frame that turns once in the period 2π.
+/// A saddle and a damped oscillator, mixed by a frame that rotates once in the period 2π.
 ///
-/// In the turning frame, with ξ and η its coordinates, ξ̈ = a² ξ and η̈ = −2c η̇ − (c² + w²) η; in the fixed one x = ξ cos t − η sin t.
+/// In the rotating frame with the coordinates ξ and η, ξ̈ = a² ξ and η̈ = −2c η̇ − (c² + w²) η; in the fixed one x = ξ
+/// cos t − η sin t.
 #[dynamics(
     coordinates(x, y),
     let xi = cos(t)*x + sin(t)*y,

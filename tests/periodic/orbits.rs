@@ -1,4 +1,4 @@
-//! Orbits and multipliers against `tests/reference/periodic.json` and closed forms.
+//! Orbits and multipliers compared with `tests/reference/periodic.json` and closed forms.
 
 use crate::common::{case, list, number, numbers};
 use crate::models::{
@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use tfe::periodic::{Orbit, Phase, Verdict};
 use tfe::prelude::*;
 
-/// Reference multipliers, the largest modulus first, the one with the positive imaginary part first of a pair.
+/// Reference multipliers: that of largest modulus first, and of a pair the one with positive imaginary part.
 fn expected(case: &Value) -> Vec<Complex<f64>> {
     let multipliers = list(&case["multipliers"]).iter();
     let mut multipliers: Vec<_> = multipliers
@@ -45,7 +45,7 @@ fn assert_relative(actual: f64, expected: f64, tolerance: f64) {
     );
 }
 
-/// The limit cycle from the circle of the linear oscillator.
+/// The limit cycle, with the circle of the linear oscillator as guess.
 fn limit_cycle(model: &VanDerPol, element: Element, elements: usize) -> Orbit<'_, VanDerPol, 1> {
     PeriodicOrbit::of(model)
         .element(element)
@@ -97,7 +97,7 @@ fn the_phase_is_that_of_the_guess_unless_one_is_chosen() {
         .expect("a limit cycle");
     assert_relative(free.period(), chosen.period(), 1e-12);
     assert_relative(free.multipliers()[1].re, chosen.multipliers()[1].re, 1e-9);
-    // Another phase, but nearby, and the same curve.
+    // The phase is slightly different, but the curve is the same.
     assert!((free.start().q[0] - start.q[0]).abs() < 0.5);
     let by_coordinate = PeriodicOrbit::of(&model)
         .element(Mixed::<6>)
@@ -146,7 +146,7 @@ fn forced_duffing() {
             && text.ends_with("stable, margin 3.6e-1"),
         "{text}"
     );
-    // e^{−δT} is shared by both.
+    // e^{−δT} is the product of both.
     let exponents = orbit.exponents();
     assert!((exponents[0].growth + 0.1).abs() < 1e-13);
     assert!(
@@ -189,7 +189,7 @@ fn flapping_blades() {
         assert_relative(orbit.start().q[0], initial[0], 1e-12);
         assert_relative(orbit.start().p[0], initial[1], 1e-12);
         assert_multipliers(&orbit, &expected(&case), 1e-11);
-        // A linear model is solved at once; the second iteration sees it.
+        // A linear model is solved at once; the second iteration confirms it.
         assert!(orbit.statistics().newton_iterations <= 3);
     }
 }
@@ -211,7 +211,7 @@ fn mathieu() {
     }
 }
 
-/// −e^{sT} with s⁴ + s²(2Ω² + ω1² + ω2²) + (ω1² − Ω²)(ω2² − Ω²) = 0.
+/// The multipliers −e^{sT} with s⁴ + s²(2Ω² + ω1² + ω2²) + (ω1² − Ω²)(ω2² − Ω²) = 0.
 fn shaft_multipliers(w1: f64, w2: f64, omega: f64) -> Vec<Complex<f64>> {
     let half = omega * omega + 0.5 * (w1 * w1 + w2 * w2);
     let product = (w1 * w1 - omega * omega) * (w2 * w2 - omega * omega);
@@ -269,7 +269,7 @@ fn the_anisotropic_shaft_at_five_speeds() {
 
 #[test]
 fn tiny_and_huge_multipliers_in_one_orbit() {
-    // e^{±2πa} and e^{−2πc}: 6e15 … 2e−16 and, of modulus, 8e−14.
+    // e^{±2πa} and e^{−2πc}: 6e15 … 2e−16, and the modulus 8e−14.
     let model = TurningSaddle {
         a: 5.8,
         c: 4.8,
@@ -285,11 +285,11 @@ fn tiny_and_huge_multipliers_in_one_orbit() {
     assert!(multipliers[0].norm() > 1e12 && multipliers[3].norm() < 1e-12);
     let expected = [TAU * 5.8, -TAU * 4.8, -TAU * 4.8, -TAU * 5.8];
     for (floquet, expected) in orbit.floquet().iter().zip(expected) {
-        // The logarithm's absolute error is the relative one of the modulus.
+        // The absolute error of the logarithm is the relative error of the modulus.
         let error = (floquet.log_modulus - expected).abs();
         assert!(error < 1e-9, "e^{expected}: relative error {error:.1e}");
     }
-    // The product of the matrices knows the largest one only.
+    // The product of the matrices determines the largest one only.
     let product = stability::eigenvalues(&orbit.monodromy()).expect("eigenvalues");
     let smallest = product
         .iter()
@@ -342,7 +342,7 @@ fn conservative_orbits_by_energy_and_by_period() {
                     .is_some_and(|unfolding| unfolding.abs() < 1e-12)
             );
             assert_eq!(orbit.trivial(), [0, 1]);
-            // A defective pair: the square root of the accuracy.
+            // A defective pair: accurate to the square root.
             assert!(orbit.multipliers().iter().all(|m| (m - 1.0).norm() < 1e-4));
             assert!(orbit.is_stable());
         }
@@ -352,7 +352,7 @@ fn conservative_orbits_by_energy_and_by_period() {
 #[test]
 fn an_angle_that_turns() {
     let pendulum = Pendulum {};
-    // p²/2 − cos θ = 2: T = ∫ dθ / √(2(2 + cos θ)), the trapezoidal rule converges geometrically.
+    // p²/2 − cos θ = 2: T = ∫ dθ / √(2(2 + cos θ)); the trapezoidal rule converges geometrically.
     let points = 64;
     let sum: f64 = (0..points)
         .map(|k| 1.0 / (2.0 * (2.0 + (TAU * f64::from(k) / f64::from(points)).cos())).sqrt())
@@ -372,7 +372,8 @@ fn an_angle_that_turns() {
 
 #[test]
 fn a_hamiltonian_orbit_with_an_elliptic_neighbourhood() {
-    // A symmetric orbit of Hénon and Heiles: on the axis x = 0, with E = 1/12; x is a Hill equation about it.
+    // A symmetric orbit of the Hénon–Heiles system on the axis x = 0 with E = 1/12; the variation in x obeys a Hill
+    // equation.
     let model = HenonHeiles {};
     let orbit = PeriodicOrbit::of(&model)
         .element(Mixed::<8>)
@@ -382,7 +383,7 @@ fn a_hamiltonian_orbit_with_an_elliptic_neighbourhood() {
         .guess(|t| ([0.0, 0.4 * t.sin()], [0.0, 0.4 * t.cos()]))
         .solve()
         .expect("an orbit on the axis");
-    // The variation in x is decoupled; its multipliers come from the motion of y alone, as a Hill equation.
+    // The variation in x is decoupled; its multipliers are those of a Hill equation with the motion of y.
     let y = orbit.motion();
     let hill = Hill { motion: &y };
     let trace = hill.trace(orbit.period());
@@ -397,7 +398,7 @@ fn a_hamiltonian_orbit_with_an_elliptic_neighbourhood() {
     assert!((product - 1.0).norm() < 1e-10);
 }
 
-/// ξ̈ = −(1 + 2y(t)) ξ along a motion of Hénon and Heiles on the axis x = 0.
+/// The Hill equation ξ̈ = −(1 + 2y(t)) ξ along a motion of the Hénon–Heiles system on the axis x = 0.
 struct Hill<'a> {
     motion: &'a Motion<2>,
 }
@@ -433,12 +434,12 @@ impl Hill<'_> {
     }
 }
 
-/// One element or two of high degree: the phase stays that of the guess here too.
+/// One or two elements of high degree: here too, the phase remains that of the guess.
 #[test]
 fn one_element_or_two_over_a_period() {
     let model = VanDerPol { mu: 0.2 };
     let many = limit_cycle(&model, Element::mixed(8), 40);
-    // Of 11 Gauss points each: the periods are 6.300093 and 6.298876885.
+    // With 11 Gauss points each, the periods are 6.300093 and 6.298876885.
     for (elements, tolerance) in [(1, 4e-4), (2, 1e-7)] {
         for phase in [
             Phase::Orthogonal,
@@ -503,7 +504,7 @@ fn graded_elements_serve_a_relaxation_oscillation() {
             .solve()
     };
     let fine = solve(vec![1.0; 2000]).expect("a limit cycle");
-    // Elements in proportion to the inverse speed of the fine solution.
+    // Elements with lengths proportional to the inverse speed of the accurate solution.
     let weights = fine.equidistributed(120);
     let graded = solve(weights).expect("a limit cycle");
     assert_relative(graded.period(), fine.period(), 1e-7);
@@ -512,7 +513,7 @@ fn graded_elements_serve_a_relaxation_oscillation() {
         fine.period(),
         graded.period() / fine.period() - 1.0
     );
-    // Equal elements of the same number are far off, if they converge at all.
+    // The same number of equal elements has a large error, if it converges at all.
     let equal = solve(vec![1.0; 120]);
     if let Ok(equal) = equal {
         let error = (equal.period() / fine.period() - 1.0).abs();
@@ -567,7 +568,7 @@ fn the_motion_of_an_orbit_is_the_stepped_one() {
     }
 }
 
-/// A state of rest has no multiplier that is one, though the model does not depend on time.
+/// An equilibrium has no multiplier equal to one, although the model does not depend on time.
 #[test]
 fn a_saddle_of_a_simulation_is_unstable() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 + x^2/2, force(x) = -3*dot(x))]

@@ -1,4 +1,4 @@
-//! Derivatives of orbits and of solutions between given ends, beside differences of solutions.
+//! Derivatives of periodic orbits and of boundary-value problems, compared with differences of solutions.
 
 use crate::differences::{difference, difference_over};
 use crate::models::{Duffing, VanDerPol};
@@ -17,7 +17,7 @@ fn close(found: f64, expected: f64, allowed: f64) {
     );
 }
 
-/// Period, start and the multiplier at a place, as numbers.
+/// The period, the initial state and one of the multipliers, as numbers.
 fn of_orbit<M: Model<1>>(orbit: &PeriodicOrbit<'_, M, 1>, place: usize) -> [f64; 5] {
     let orbit = orbit.solve().expect("an orbit");
     let (start, multiplier) = (orbit.start(), orbit.multipliers()[place]);
@@ -42,7 +42,7 @@ fn of_slopes(slopes: &OrbitSlopes<1>, place: usize) -> [f64; 5] {
     ]
 }
 
-/// Tight, so that differences see roundings alone.
+/// A tight tolerance, so that differences contain rounding errors only.
 fn tight<'m, M: Model<1>>(model: &'m M, guess: State<1>) -> PeriodicOrbit<'m, M, 1> {
     PeriodicOrbit::of(model)
         .element(Mixed::<6>)
@@ -58,7 +58,8 @@ fn compare<const K: usize>(found: [f64; K], expected: [f64; K], allowed: f64) {
     }
 }
 
-/// A limit cycle of its own period, whose start is a turning point: the condition of phase has a part.
+/// A limit cycle with unknown period whose start is a turning point: the phase condition contributes to the
+/// derivatives.
 #[test]
 fn a_limit_cycle_by_its_damping() {
     fn cycle(model: &VanDerPol) -> PeriodicOrbit<'_, VanDerPol, 1> {
@@ -82,7 +83,7 @@ fn a_limit_cycle_by_its_damping() {
     assert!(s.by_period().is_none() && s.get("nu").is_none());
 }
 
-/// A forced oscillation with complex multipliers, by all parameters; by the frequency the period changes, too.
+/// A forced oscillation with complex multipliers, by all parameters; the frequency also changes the period.
 #[test]
 fn a_forced_oscillation_by_all_parameters() {
     fn response(model: &Duffing) -> PeriodicOrbit<'_, Duffing, 1> {
@@ -119,7 +120,7 @@ fn a_forced_oscillation_by_all_parameters() {
     );
 }
 
-/// A drag that is next to zero moves multipliers as one that is zero does.
+/// A drag close to zero must give the same derivatives of multipliers as one that is zero.
 #[test]
 fn multipliers_by_a_parameter_next_to_zero() {
     let found = |delta: f64| {
@@ -149,7 +150,7 @@ struct Swing {
     k: f64,
 }
 
-/// 2π √(m/k) / M(1, cos A/2), with M the arithmetic-geometric mean and k cos A = −E.
+/// The period 2π √(m/k) / M(1, cos A/2), where M is the arithmetic–geometric mean and k cos A = −E.
 fn period([m, k]: [f64; 2], energy: f64) -> f64 {
     let (mut a, mut b) = (1.0, (0.5 * (1.0 - energy / k)).sqrt());
     while a - b > 1e-15 {
@@ -158,7 +159,7 @@ fn period([m, k]: [f64; 2], energy: f64) -> f64 {
     TAU * (m / k).sqrt() / a
 }
 
-/// Orbits of a conservative model come in families: at one energy the period changes, at one period the energy.
+/// Orbits of a conservative model form families: with given energy the period changes, with given period the energy.
 #[test]
 fn a_free_swing_at_one_energy_and_at_one_period() {
     let (m, k, energy) = (1.1, 1.3, -0.5);
@@ -171,7 +172,7 @@ fn a_free_swing_at_one_energy_and_at_one_period() {
     let [by_k] = difference(|k| [period([m, k], energy)], k);
     close(s.by("m").period(), by_m, 1e-10);
     close(s.by("k").period(), by_k, 1e-10);
-    // At its period, of amplitude A(T): the start moves along the flow not at all.
+    // With a given period the amplitude is A(T), and the initial state does not move along the flow.
     let period_then = s.orbit().period();
     let at_period = swing().period(period_then).solve_sensitive();
     let at_period = at_period.expect("an orbit");
@@ -179,7 +180,7 @@ fn a_free_swing_at_one_energy_and_at_one_period() {
         k * start.q[0].sin() * slope.q[0] + start.p[0] / m * slope.p[0]
     };
     let start = at_period.orbit().start();
-    // E changes with k by what keeps T, and by −cos θ at fixed start.
+    // E changes with k by what keeps T constant, and by −cos θ at fixed initial state.
     let by_energy = {
         let [slope] = difference(|energy| [period([m, k], energy)], energy);
         -by_k / slope
@@ -191,7 +192,7 @@ fn a_free_swing_at_one_energy_and_at_one_period() {
     close(energy_of(start, by_period.start()), 1.0 / slope, 1e-9);
 }
 
-/// Two multipliers that meet have no derivative, and none is told.
+/// Two multipliers that meet have no derivatives, and none are returned.
 #[test]
 fn multipliers_that_meet_are_left_out() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k*x^2/2, force(x) = -c*dot(x) + cos(t))]
@@ -199,7 +200,7 @@ fn multipliers_that_meet_are_left_out() {
         k: f64,
         c: f64,
     }
-    // At its critical damping: both are exp(−2π).
+    // At critical damping both are exp(−2π).
     let critical = Damped { k: 1.0, c: 2.0 };
     let s = tight(&critical, critical.state([0.0], [0.5])).period(TAU);
     let s = s.solve_sensitive().expect("an orbit");
@@ -215,7 +216,7 @@ fn multipliers_that_meet_are_left_out() {
     close(relative.re, -TAU / 2.0, 1e-9);
 }
 
-/// A model without parameters has nothing to be differentiated by but what is given.
+/// A model without parameters can be differentiated by the given quantities only.
 #[test]
 fn models_without_parameters() {
     #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2 - x^4/4)]
@@ -232,7 +233,8 @@ fn models_without_parameters() {
     assert!(arc.parameters().is_empty() && arc.by_end(Coordinate(0)).is_some());
 }
 
-/// With a constraint, by parameters of forces, of the pivot and of the constraint; beside the twin in one angle.
+/// With a constraint, by parameters of forces, of the pivot and of the constraint; compared with the equivalent model
+/// in one angle.
 #[test]
 fn a_constrained_orbit_beside_its_twin() {
     #[dynamics(
@@ -337,7 +339,7 @@ fn transfer(
     .expect("a motion")
 }
 
-/// From place to place around a centre; and one whose momentum at the end is given.
+/// From one position to another around a centre; and with a given momentum at the end.
 #[test]
 fn solutions_between_ends_by_parameters_and_by_their_ends() {
     let model = Transfer {
@@ -395,7 +397,7 @@ fn solutions_between_ends_by_parameters_and_by_their_ends() {
     }
 }
 
-/// An oscillator that hits a wall once a period, with what the wall does.
+/// An oscillator that hits a wall once per period, with a parameter of the impact.
 #[dynamics(
     coordinates(x),
     lagrangian = (m*dot(x)^2 - k*x^2)/2 + f*cos(omega*t)*x,
@@ -412,7 +414,7 @@ struct Impacting {
     omega: f64,
 }
 
-/// A clock: each swing upwards through the middle a kick that depends on how fast it is.
+/// A clock: each swing upwards through the middle gets an impulse that depends on the speed.
 #[dynamics(coordinates(x), lagrangian = (m*dot(x)^2 - k*x^2)/2 - b*x^4/4, force(x) = -c*dot(x), event(middle) = x)]
 #[derive(Clone)]
 struct Clock {
@@ -459,7 +461,7 @@ fn orbits_with_impacts_by_all_parameters() {
     let with = |index: usize, value: f64| model.with_parameter(index, value).expect("numbers");
     let by_period = of_slopes(s.by_period().expect("it is given"), 0);
     for (index, name) in s.parameters().iter().enumerate() {
-        // Over a shorter distance: the multipliers are near where they meet.
+        // With a smaller spacing of differences: the multipliers are close to where they meet.
         let expected = difference_over(
             1e-3 * model.parameter(index),
             |x| of_hybrid(&orbits(&with(index, x)).solve().expect("an orbit"), 0),
@@ -507,14 +509,15 @@ fn a_clock_by_all_parameters() {
             },
             model.parameter(index),
         );
-        // Where an orbit begins is open: the start may have moved along it.
+        // The starting point of an orbit is arbitrary: it may have moved along the orbit.
         let found = of_slopes(s.by(name), other);
         close(found[0], expected[0], 1e-9);
         close(found[3], expected[3], 1e-8);
     }
 }
 
-/// An orbit of forty periods of the force has forgotten its start at its end: how its start changes with the period is how fast it moves there, at ẍ = f cos 0 − δ ẋ − x.
+/// An orbit of forty periods of the force has forgotten its initial state at its end. The derivative of the initial
+/// state by the period is therefore the velocity there, with ẍ = f cos 0 − δ ẋ − x.
 #[test]
 fn a_period_of_many_turns_changes_the_start_as_one_does() {
     let model = Duffing {
@@ -533,7 +536,7 @@ fn a_period_of_many_turns_changes_the_start_as_one_does() {
         .expect("an orbit");
     let start = s.orbit().start();
     let by_period = s.by_period().expect("it is given").start();
-    // Less what is left of the start, e^{−0.1 T} = 2e-8.
+    // Except for the remaining effect of the initial state, e^{−0.1 T} = 2e-8.
     close(by_period.q[0], start.p[0], 1e-6);
     let rate = 0.3 - 0.2 * start.p[0] - start.q[0];
     close(by_period.p[0], rate, 1e-6);

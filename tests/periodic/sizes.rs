@@ -1,4 +1,4 @@
-//! Units of masses, lengths and times make no difference.
+//! The units of mass, length and time must not matter.
 
 use crate::common::larger;
 use crate::models::Pendulum;
@@ -8,7 +8,7 @@ use tfe::boundary::BoundaryError;
 use tfe::periodic::OrbitError;
 use tfe::prelude::*;
 
-/// A particle in a plane, between springs that stiffen.
+/// A particle in a plane, between hardening springs.
 #[dynamics(
     coordinates(x, y),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2) - k/2*(x^2 + 2*y^2) - b*k/l^2*x^2*y^2,
@@ -20,7 +20,7 @@ struct Plane {
     l: f64,
 }
 
-/// A pendulum in a viscous fluid that is pushed to and fro.
+/// A pendulum in a viscous fluid that moves to and fro.
 #[dynamics(
     coordinates(theta),
     lagrangian = m*l^2/2*dot(theta)^2 + m*g*l*cos(theta),
@@ -35,7 +35,7 @@ struct Pushed {
     c: f64,
 }
 
-/// Van der Pol's oscillator of any mass.
+/// Van der Pol's oscillator with any mass.
 #[dynamics(
     coordinates(x),
     lagrangian = m*(dot(x)^2 - x^2)/2,
@@ -45,7 +45,7 @@ struct VanDerPol {
     m: f64,
 }
 
-/// A pendulum in something that is a long way off, and goes farther.
+/// A pendulum in a vehicle that is far away and moves on.
 #[dynamics(
     coordinates(x, theta),
     lagrangian = m*dot(x)^2/2 + dot(theta)^2/2 + cos(theta),
@@ -54,7 +54,7 @@ struct Carried {
     m: f64,
 }
 
-/// Van der Pol's oscillator in something that is a long way off.
+/// Van der Pol's oscillator in a vehicle that is far away.
 #[dynamics(
     coordinates(x, y),
     lagrangian = dot(x)^2/2 + (dot(y)^2 - y^2)/2,
@@ -62,7 +62,7 @@ struct Carried {
 )]
 struct FarVanDerPol {}
 
-/// Masses, lengths and times, one of them in other units.
+/// Units of mass, length and time, with one of them changed.
 fn units() -> impl Iterator<Item = [f64; 3]> {
     let sizes = [1e-100, 1e-30, 1e-9, 1e-4, 1.0, 1e4, 1e9, 1e30, 1e100];
     sizes
@@ -88,13 +88,13 @@ fn conservative_orbits_have_the_same_period() {
             .unknown_period(4.5 * t)
             .solve();
         let orbit = orbit.unwrap_or_else(|error| panic!("{m:e} {l:e} {t:e}: {error}"));
-        // Along the axis the spring is linear; twelve elements are off by 9e-7.
+        // Along the axis the spring is linear; the error of twelve elements is 9e-7.
         let period = orbit.period() / t;
         assert!(
             (period - TAU / 2.0_f64.sqrt()).abs() < 1e-6,
             "{m:e} {l:e} {t:e}: {period}"
         );
-        // With its digits, not with rows of zeros.
+        // With all digits, and not with rows of zeros.
         let shown = orbit.to_string().replace('.', "");
         assert!(shown.contains("T = 4442"), "{orbit}");
         assert!(
@@ -126,7 +126,8 @@ fn forced_orbits_have_the_same_multipliers() {
         (orbit.start().q[0], moduli)
     };
     let (angle, moduli) = found([1.0; 3]);
-    // Abel, Jacobi, Liouville: a damping of 0.1 over the period takes as much of every area.
+    // By the formula of Abel, Jacobi and Liouville, a damping of 0.1 reduces every area over the period by the same
+    // factor.
     let product = (-0.1 * TAU / 0.7_f64).exp();
     let off = moduli.iter().product::<f64>() - product;
     assert!(off.abs() < 1e-5, "{off:e}");
@@ -139,7 +140,7 @@ fn forced_orbits_have_the_same_multipliers() {
     }
 }
 
-/// An angle beside a distance is as right as it is alone, whatever is small beside the distance.
+/// An angle next to a distance is as accurate as alone, although it is small relative to the distance.
 #[test]
 fn small_coordinates_are_right_beside_large_ones() {
     let pendulum = Pendulum {};
@@ -170,7 +171,8 @@ fn small_coordinates_are_right_beside_large_ones() {
     }
 }
 
-/// Where the iteration for an angle goes to and fro the distance beside it says nothing: what is returned is a motion.
+/// If the iteration for an angle does not converge, convergence of a distance next to it is no evidence: what is
+/// returned must be a motion.
 #[test]
 fn small_coordinates_that_are_not_found_are_no_solution() {
     let (carried, pendulum) = (Carried { m: 1.0 }, Pendulum {});
@@ -191,7 +193,7 @@ fn small_coordinates_that_are_not_found_are_no_solution() {
                     .step(time / 40.0)
                     .run(start, 0.0..time)
                     .expect("a run");
-                // Ten units of time multiply roundings by some 1e4.
+                // Ten units of time amplify rounding errors by about 1e4.
                 let off = (run.last().q[0] - angle).abs();
                 assert!(off < 1e-7, "{time}, {angle}: {off:e}");
             }
@@ -201,7 +203,8 @@ fn small_coordinates_that_are_not_found_are_no_solution() {
     }
 }
 
-/// A limit cycle has one period only: a light one must not be forced to another, nor a heavy one be refused its own.
+/// A limit cycle has one period only: with a small mass no other period may be accepted, and with a large one the right
+/// period may not be refused.
 #[test]
 fn a_force_that_closes_an_orbit_is_measured_by_the_mass() {
     for m in [1e-12, 1e-6, 1.0, 1e6, 1e12] {
@@ -209,7 +212,7 @@ fn a_force_that_closes_an_orbit_is_measured_by_the_mass() {
         let guess = |t: f64| ([2.0 * t.cos()], [-2.0 * t.sin()]);
         let of = || PeriodicOrbit::of(&oscillator).elements(40).guess(guess);
         let orbit = of().unknown_period(6.6).solve().expect("a limit cycle");
-        // As in `tests/reference/periodic.json`.
+        // Reference: `tests/reference/periodic.json`.
         assert!(
             (orbit.period() - 6.663_286_859_3).abs() < 1e-6,
             "{m:e}: {}",
@@ -220,7 +223,7 @@ fn a_force_that_closes_an_orbit_is_measured_by_the_mass() {
     }
 }
 
-/// Orbits of simulations close in each coordinate, however far from zero another one is.
+/// Orbits of simulations must close in each coordinate, however far from zero another one is.
 #[test]
 fn small_coordinates_of_orbits_with_events_close_beside_large_ones() {
     let oscillator = FarVanDerPol {};
@@ -231,7 +234,7 @@ fn small_coordinates_of_orbits_with_events_close_beside_large_ones() {
             .guess_from(oscillator.state([far, 2.0], [0.0, 0.0]))
             .solve()
             .unwrap_or_else(|error| panic!("{far:e}: {error}"));
-        // As in `tests/reference/periodic.json`.
+        // Reference: `tests/reference/periodic.json`.
         let period = orbit.period();
         assert!((period - 6.663_286_859_3).abs() < 1e-6, "{far:e}: {period}");
     }

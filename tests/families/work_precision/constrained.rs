@@ -1,4 +1,4 @@
-//! Accuracy against cost of families on constraints.
+//! Work–precision diagrams for models of run-time length with constraints.
 
 #[cfg(feature = "sparse")]
 use super::measure;
@@ -7,7 +7,7 @@ use tfe::family::FamilyState;
 use tfe::prelude::*;
 use tfe::work_precision::WorkPrecisionError;
 
-/// A chain of rods that hangs on one of them.
+/// A chain of rods, hanging from the first one.
 #[dynamics(
     coordinates(x[n], y[n]),
     lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - g*y[i]),
@@ -20,7 +20,7 @@ struct Rods {
     l: f64,
 }
 
-/// Straight, at an angle, at rest.
+/// Straight, at an angle, and at rest.
 fn hanging(rods: &Rods) -> FamilyState {
     let length = |i: usize| rods.l * (i as f64 + 1.0);
     let x = (0..rods.n).map(|i| length(i) * 0.6);
@@ -51,7 +51,7 @@ fn constrained_families_have_their_residual() {
     };
     for (curve, order) in [(three, 4.0), (four, 6.0)] {
         for (_, one) in curve.measured() {
-            // Solved to round-off: lengths of a half, velocities below ten.
+            // Solved up to rounding; lengths are one half, and velocities below ten.
             assert!(one.constraint_position < 1e-12, "{one:?}");
             assert!(one.constraint_velocity < 1e-12, "{one:?}");
             assert!(one.constraint_position + one.constraint_velocity > 0.0);
@@ -61,7 +61,7 @@ fn constrained_families_have_their_residual() {
         let slope = curve.slope().expect("a power");
         assert!((slope.exponent - order).abs() < 0.5, "{slope:?}");
     }
-    // It has no place for the multipliers.
+    // This element does not support multipliers.
     assert_eq!(radau.failed(), 3);
     let mut off = start;
     off.q[3] += 1e-3;
