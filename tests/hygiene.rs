@@ -107,8 +107,7 @@ pub mod without_prelude {
     /// Hides the crate.
     pub mod tfe {}
 
-    /// Pairs of bodies whose forces cancel, so many that they remain loops. The parameters are named like the variables
-    /// of these loops.
+    /// Pairs of bodies whose forces cancel, enough to remain loops. Parameters are named like variables of these loops.
     #[::tfe::dynamics(
         coordinates(x[18]),
         lagrangian = sum(i in 0..18, sums/2*dot(x[i])^2) + sum(i in 0..18, sum(j in 0..i, sum_*column*cos(x[i] - x[j]))),
@@ -397,8 +396,7 @@ pub struct Greek {
     pub μ: f64,
 }
 
-/// A field named like the cosine of a coordinate whose name ends in an underscore, which is how clashing fields are
-/// renamed.
+/// A field named like the cosine of a coordinate whose name ends in an underscore, as clashing fields are renamed.
 #[dynamics(coordinates(phi_), lagrangian = dot(phi_)^2/2 - cos_phi*sin(phi_))]
 pub struct Underscored {
     /// Named like the cosine.

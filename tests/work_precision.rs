@@ -109,8 +109,7 @@ fn the_computed_reference_is_that_of_the_table() {
     assert_eq!(computed.points().count(), given.points().count());
     for (a, b) in computed.points().zip(given.points()) {
         let (a, b) = (a.measured().unwrap(), b.measured().unwrap());
-        // The errors have different scales, the largest state of ten or of start and end; both momenta are within a
-        // factor of two.
+        // The scales differ: the largest state of ten, or of start and end. Both momenta are within a factor of two.
         assert!((a.error_q - b.error_q).abs() < 1e-13 + 0.2 * b.error_q);
         assert!(a.error_p < 2.0 * b.error_p && b.error_p < 2.0 * a.error_p);
     }
@@ -150,8 +149,7 @@ fn errors_against_a_function_are_relative_and_include_those_on_the_way() {
         .run()
         .unwrap();
     let point = measured.points().next().unwrap().measured().unwrap();
-    // The midpoint rule rotates by 2 atan(h/2) per step, and therefore has a phase error of h²/12 · t, here 0.0025 at
-    // the end.
+    // The midpoint rule rotates by 2 atan(h/2) per step: its phase error is h²/12 · t, here 0.0025 at the end.
     let behind = 3.0 - 30.0 * 2.0 * 0.05_f64.atan();
     // The scales: |q_ref| is one at the start, and |p_ref| is largest at t = 1.5 among the times compared.
     let scale = 1.5_f64.sin();

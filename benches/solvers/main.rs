@@ -1,5 +1,5 @@
-//! Emitted solvers and the general stepper, compared with steppers written by hand: instructions, nanoseconds,
-//! iterations and errors per step.
+//! Emitted solvers and the general stepper, compared with steppers written by hand: instructions, nanoseconds and
+//! iterations per step, and errors.
 //!
 //! `cargo bench --bench solvers` prints the table; `cargo bench --bench solvers -- pendulum kepler` only these scenes;
 //! `-- --instructions` no times, for a machine that is busy with other things; `-- starts` only the runs from thousands

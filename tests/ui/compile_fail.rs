@@ -1,11 +1,13 @@
-//! Mistakes in a declaration: the whole message of each, under the guilty token. `TRYBUILD=overwrite cargo test` rewrites the expectations.
+//! Compile errors for mistakes in a declaration: the whole message of each, with the underlined token.
+//! `TRYBUILD=overwrite cargo test` rewrites the expected messages.
 
 use std::process::Command;
 
-/// What cargo takes its flags from before all else.
+/// The environment variable with flags for rustc that takes precedence over all others.
 const FLAGS: &str = "CARGO_ENCODED_RUSTFLAGS";
 
-/// `trybuild` compiles the crates that cases depend on with one set of flags, and once more with another for the cases. With flags from the environment, these, they are compiled once.
+/// `trybuild` compiles the crates on which the cases depend with one set of flags, and again with another one for the
+/// cases. With the flags from the environment, which are these, they are compiled only once.
 const OF_CASES: &str = "--cfg\x1ftrybuild\x1f-A\x1fdead_code\x1f--diagnostic-width=140";
 
 #[test]
@@ -24,7 +26,8 @@ fn messages() {
     assert!(status.success(), "messages differ, see above");
 }
 
-/// The engine's own corpus has a case for every kind of diagnostic; here are those that a user meets, with the place that rustc underlines.
+/// The engine's own test corpus has a case for every kind of diagnostic. Here are those that users are likely to meet,
+/// with the place that rustc underlines.
 #[test]
 fn there_are_many_cases() {
     let themes = std::fs::read_dir(env!("CARGO_MANIFEST_DIR")).expect("a folder of themes");
