@@ -83,9 +83,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let last = run.steps(below, 0.0).nth(STEPS - 1);
         Ok(last.ok_or("an endless run")??.q[1])
     })?;
-    println!(
-        "{STEPS} steps of a cart and pole      ns per step   `hold` / this   angle at the end"
-    );
+    println!("{STEPS} steps of a cart and pole    ns per step    `hold` / this   angle at the end");
     for (name, (time, angle)) in [
         ("`hold`, an input set before each", held),
         ("`steps()`, feedback declared", declared),

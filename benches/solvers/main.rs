@@ -164,7 +164,7 @@ fn main() -> Result<(), Failure> {
         .any(|argument| argument == "--instructions");
     let names: Vec<&String> = arguments.iter().filter(|a| !a.starts_with('-')).collect();
     println!(
-        "                          instructions per step                nanoseconds per step            iterations     error"
+        "                          instructions per step                nanoseconds per step           iterations     error"
     );
     println!(
         "scene          nodes    hand emitted general  e/h   g/e    hand emitted general  e/h   g/e  hand emitted  hand emitted"

@@ -62,10 +62,7 @@ impl Scene {
                 .only(|curve| fastest.contains(&Some(curve.element())));
             charts.insert(
                 0,
-                (
-                    "peers",
-                    beside.title(of("tfe's fastest elements and other crates")),
-                ),
+                ("peers", beside.title(of("our fastest and other crates"))),
             );
         }
         self.measured.save(folder.join(format!("{name}.csv")))?;
