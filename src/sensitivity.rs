@@ -7,6 +7,7 @@ pub(crate) mod names;
 #[cfg(feature = "sparse")]
 pub(crate) mod run_time;
 pub(crate) mod slopes;
+pub(crate) mod varied;
 
 use crate::length::{FixedLength, Length};
 use crate::motion::{AtError, Motion, Node};

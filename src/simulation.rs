@@ -20,6 +20,8 @@ mod pieces;
 mod progress;
 mod recorder;
 mod resolution;
+#[cfg(feature = "sparse")]
+mod retrace;
 mod run;
 mod section;
 mod sensitive;

@@ -78,33 +78,6 @@ pub(crate) struct Between {
 }
 
 impl Inside {
-    /// An element with known derivatives by the start of the run and by parameters: those of (p, q) at its start, and
-    /// those of its coefficients.
-    #[cfg(feature = "sparse")]
-    pub(crate) fn whole(
-        times: (f64, f64),
-        length: f64,
-        start: &DMatrix<f64>,
-        coefficients: &DMatrix<f64>,
-    ) -> Self {
-        let rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
-        let (size, columns) = start.shape();
-        Self {
-            times,
-            length,
-            slopes: InsideSlopes {
-                start: rows(start),
-                coefficients: rows(coefficients),
-            },
-            before: Before {
-                state: DMatrix::identity(size, columns),
-                start: None,
-            },
-            ends: None,
-            moved: None,
-        }
-    }
-
     fn coordinates(&self) -> usize {
         self.before.state.nrows() / 2
     }

@@ -1,7 +1,8 @@
-//! Derivatives of velocities and outputs by states and parameters, for models of run-time length.
+//! Derivatives of velocities by states, times and parameters, for models of run-time length.
 
 use crate::length::RunTimeLength;
 use crate::motion::Node;
+use crate::sensitivity::slopes::Change;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 use tfe_runtime::Form;
 use tfe_runtime::dual::Dual;
@@ -39,7 +40,7 @@ impl Entries<Dual> for Held<'_> {
     }
 }
 
-/// The derivatives of the velocities and outputs of a model at a node.
+/// The derivatives of the velocities of a model at a node.
 pub(crate) struct Along<'a, M> {
     model: &'a M,
     node: &'a Node<0, RunTimeLength>,
@@ -93,39 +94,24 @@ impl<'a, M: Model> Along<'a, M> {
         mass.matrix.lu()
     }
 
-    /// The derivatives of the velocities (NaN if the mass matrix is singular) and of the outputs, along a change of (p,
-    /// q) and of a parameter.
-    pub(crate) fn slopes(&self, change: &[f64], parameter: Option<usize>) -> (Vec<f64>, Vec<f64>) {
+    /// δv; NaN if the mass matrix is singular.
+    pub(crate) fn velocity(&self, change: &Change<0, RunTimeLength>) -> Vec<f64> {
         let n = self.model.len();
-        let (by_p, by_q) = change.split_at(n);
-        let time = Dual::new(self.node.t, 0.0).by_parameter(parameter);
-        let q = duals(&self.node.q, by_q);
-        let p = duals(&self.node.p, by_p);
-        let velocity: Vec<f64> = match &self.factors {
-            None => self.by_z(time, &q, &p),
-            Some(factors) => {
-                // p = L_v(q, v): L_vv δv = δp − ∂L_v/∂(q, a).
-                let still = duals(&self.node.v, &vec![0.0; n]);
-                let by_others = self.by_z(time, &q, &still);
-                let mut right: Vec<f64> = by_p.iter().zip(&by_others).map(|(p, l)| p - l).collect();
-                if let Some(eta) = &self.eta {
-                    self.add_held(time, &q, eta, &mut right);
-                }
-                let right = DVector::from_vec(right);
-                let found = factors.solve(&right);
-                found.map_or_else(|| vec![f64::NAN; n], |found| found.as_slice()[..n].to_vec())
-            }
+        let time = Dual::new(self.node.t, change.t).by_parameter(change.parameter);
+        let q = duals(&self.node.q, &change.q);
+        let Some(factors) = &self.factors else {
+            return self.by_z(time, &q, &duals(&self.node.p, &change.p));
         };
-        let mut values = vec![Dual::ZERO; self.model.columns()];
-        if !values.is_empty() {
-            let z = match M::FORM {
-                Form::Lagrangian => duals(&self.node.v, &velocity),
-                Form::Hamiltonian => p,
-            };
-            self.model.observables(time, &q, &z, &mut values);
+        // p = L_v(q, v, t): L_vv δv = δp − ∂L_v/∂(t, q, a).
+        let still = duals(&self.node.v, &vec![0.0; n]);
+        let by_others = self.by_z(time, &q, &still);
+        let by_p = change.p.iter().zip(&by_others);
+        let mut right: Vec<f64> = by_p.map(|(p, l)| p - l).collect();
+        if let Some(eta) = &self.eta {
+            self.add_held(time, &q, eta, &mut right);
         }
-        let outputs = values.iter().map(|value| value.slope).collect();
-        (velocity, outputs)
+        let found = factors.solve(&DVector::from_vec(right));
+        found.map_or_else(|| vec![f64::NAN; n], |found| found.as_slice()[..n].to_vec())
     }
 
     /// Subtracts the derivatives of Aᵀη from the entries of `right`, and appends those of −(A v + a), at constant

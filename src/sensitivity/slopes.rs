@@ -1,24 +1,26 @@
 //! Derivatives of velocities and outputs by states, times and parameters, for models of fixed size.
 
+use crate::length::{FixedLength, Length};
 use nalgebra::{DMatrix, DVector};
 use tfe_runtime::constrained::HeldVelocity;
 use tfe_runtime::dual::{Dual, duals};
-use tfe_runtime::{Direction, First, Form, Model, Parameter, State};
+use tfe_runtime::{Direction, First, Form, Model, Parameter};
 
 /// A point of a motion with its velocity.
 #[derive(Clone, Copy)]
 pub(crate) struct Place<'a, const N: usize> {
     pub(crate) t: f64,
-    pub(crate) state: &'a State<N>,
+    pub(crate) q: &'a [f64; N],
+    pub(crate) p: &'a [f64; N],
     pub(crate) v: &'a [f64; N],
 }
 
-/// A change of such a point.
-#[derive(Clone, Copy)]
-pub(crate) struct Change<const N: usize> {
+/// A change of a point of a motion, for models of either kind of length.
+#[derive(Clone)]
+pub(crate) struct Change<const N: usize, L: Length<N> = FixedLength> {
     pub(crate) t: f64,
-    pub(crate) q: [f64; N],
-    pub(crate) p: [f64; N],
+    pub(crate) q: L::Vector,
+    pub(crate) p: L::Vector,
     /// The index of the parameter that changes by one.
     pub(crate) parameter: Option<usize>,
 }
@@ -31,13 +33,27 @@ impl<const N: usize> Change<N> {
         p: [0.0; N],
         parameter: None,
     };
+}
 
-    /// The change from a column of a matrix with rows in the order (p, q).
-    pub(crate) fn of_column(matrix: &DMatrix<f64>, column: usize) -> Self {
+impl<const N: usize, L: Length<N>> Change<N, L> {
+    /// The change of a parameter alone, or no change for `None`; `like` is a vector of the length of the coordinates.
+    pub(crate) fn by(parameter: Option<usize>, like: &L::Vector) -> Self {
         Self {
             t: 0.0,
-            q: std::array::from_fn(|a| matrix[(N + a, column)]),
-            p: std::array::from_fn(|a| matrix[(a, column)]),
+            q: L::zero(like),
+            p: L::zero(like),
+            parameter,
+        }
+    }
+
+    /// The change from a column of a matrix with rows in the order (p, q); `like` is a vector of the length of the
+    /// coordinates.
+    pub(crate) fn of_column(like: &L::Vector, matrix: &DMatrix<f64>, column: usize) -> Self {
+        let n = matrix.nrows() / 2;
+        Self {
+            t: 0.0,
+            q: L::from_fn(like, |a| matrix[(n + a, column)]),
+            p: L::from_fn(like, |a| matrix[(a, column)]),
             parameter: None,
         }
     }
@@ -55,16 +71,16 @@ pub(crate) struct Along<'a, M, const N: usize> {
 
 impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
     pub(crate) fn new(model: &'a M, place: Place<'a, N>) -> Self {
-        let Place { t, state, v } = place;
+        let Place { t, q, p, v } = place;
         let unknown = || DMatrix::from_element(N, N, f64::NAN);
-        let held = HeldVelocity::of(model, t, (&state.q, &state.p), v);
+        let held = HeldVelocity::of(model, t, (q, p), v);
         let inverse = match (M::FORM, &held) {
             (Form::Hamiltonian, _) => None,
             // The constraints do not determine the velocity either.
             (Form::Lagrangian, Err(_)) => Some(unknown()),
             (Form::Lagrangian, Ok(_)) => {
                 let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
-                model.first_and_mass(t, &state.q, v, &mut first, &mut zz);
+                model.first_and_mass(t, q, v, &mut first, &mut zz);
                 let mass = DMatrix::from_fn(N, N, |a, b| zz[a][b]);
                 // By factorisation: for two to four coordinates, nalgebra would divide by the determinant, a product of
                 // as many masses, which may overflow or underflow.
@@ -81,12 +97,12 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
 
     /// δv; NaN if the mass matrix is singular. With constraints, for changes that these allow.
     pub(crate) fn velocity(&self, change: &Change<N>) -> [f64; N] {
-        let Place { t, state, v } = self.place;
+        let Place { t, q, p, v } = self.place;
         let time = Dual::new(t, change.t).by_parameter(change.parameter);
-        let q = duals(&state.q, &change.q);
+        let q = duals(q, &change.q);
         let mut first = First::zero();
         let Some(inverse) = &self.inverse else {
-            let p = duals(&state.p, &change.p);
+            let p = duals(p, &change.p);
             self.model.first(time, &q, &p, &mut first);
             return first.z.map(|one| one.slope);
         };
@@ -102,12 +118,12 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
 
     /// The changes of all outputs, given the change of the velocity.
     pub(crate) fn outputs(&self, change: &Change<N>, velocity: &[f64; N]) -> Vec<f64> {
-        let Place { t, state, v } = self.place;
+        let Place { t, q, p, v } = self.place;
         let time = Dual::new(t, change.t).by_parameter(change.parameter);
-        let q = duals(&state.q, &change.q);
+        let q = duals(q, &change.q);
         let z = match M::FORM {
             Form::Lagrangian => duals(v, velocity),
-            Form::Hamiltonian => duals(&state.p, &change.p),
+            Form::Hamiltonian => duals(p, &change.p),
         };
         let mut values = vec![Dual::ZERO; self.model.columns()];
         self.model.observables(time, &q, &z, &mut values);

@@ -32,6 +32,7 @@ use tfe_runtime::step::Impulse;
 use value::Value;
 
 /// An event that a run watches.
+#[derive(Clone)]
 pub struct Watched<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(super) on: On<'m, N, L>,
     pub(super) value: Value<'m, L::Vector>,

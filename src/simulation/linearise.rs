@@ -1,6 +1,6 @@
 //! Runs with the transition matrices of all elements.
 
-pub(in crate::simulation) mod family;
+mod family;
 
 use super::checks::check_kinks;
 use super::events::Severed;

@@ -1,7 +1,8 @@
 //! Runs with derivatives by parameters and by the start (T-123, T-124).
 
 mod acts;
-mod family;
+pub(super) mod carried;
+pub(super) mod family;
 
 use super::checks::check_kinks;
 use super::events::Severed;
@@ -10,17 +11,17 @@ use super::setup::Simulation;
 use crate::constraints::tangent_basis;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
-use crate::sensitivity::inside::{Before, Inside, Moved};
-use crate::sensitivity::slopes::{Along, Change, Place, directions};
-use crate::sensitivity::{Sensitive, Slopes};
-use acts::Acting;
-use nalgebra::{DMatrix, RowDVector};
+use crate::sensitivity::Sensitive;
+use crate::sensitivity::slopes::directions;
+use crate::sensitivity::varied::Varied;
+use carried::{Along, AlongPiece, Carried, END, Reached, START};
+use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
-use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::step::{Control, DenseElement, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{
-    ConstraintError, Direction, Element, First, Form, InsideSlopes, Model, Share, State, StepError,
+    ConstraintError, Direction, Element, InsideSlopes, Model, Share, State, StepError,
 };
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
@@ -97,19 +98,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 pub struct Tangents<'m, M, const N: usize> {
     model: Share<'m, M>,
     chosen: (Element, Control),
-    /// The parameters: their indices, and their directions.
-    indices: Vec<usize>,
+    /// The parameters, as directions.
     parameters: Vec<Direction>,
-    /// The derivatives at the current state.
-    before: Before,
-    /// ∂(p, q)/∂(start, parameters) after the action that follows.
-    acted: Option<DMatrix<f64>>,
-    /// The error of an action that sets a parameter to a value which depends on the state.
-    dependent: Option<RunErrorKind>,
-    nodes: Vec<Slopes>,
-    /// The derivatives along the elements so far, if asked for.
-    inside: Option<Vec<Inside>>,
-    events: Vec<(usize, Vec<f64>)>,
+    carried: Carried,
     /// A stepper for elements that events have cut.
     probe: Option<Stepper<'m, M, N>>,
     /// A basis of the motions that the constraints allow at the point from which derivatives are counted, for models
@@ -127,40 +118,13 @@ struct Across {
     inside: Vec<InsideSlopes>,
 }
 
-/// The start of the element moves in time, its end does not.
-const START: Direction = Direction {
-    time: 1.0,
-    length: -1.0,
-    parameter: None,
-    damping: 0.0,
-};
-
-/// Only the end moves in time.
-const END: Direction = Direction {
-    time: 0.0,
-    length: 1.0,
-    parameter: None,
-    damping: 0.0,
-};
-
 impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     pub(super) fn new(model: Share<'m, M>, chosen: (Element, Control), indices: &[usize]) -> Self {
-        let parameters = directions(&*model, indices);
-        let columns = 2 * N + parameters.len();
         Self {
+            parameters: directions(&*model, indices),
+            carried: Carried::new(N, indices),
             model,
             chosen,
-            indices: indices.to_vec(),
-            parameters,
-            before: Before {
-                state: DMatrix::identity(2 * N, columns),
-                start: None,
-            },
-            acted: None,
-            dependent: None,
-            nodes: Vec::new(),
-            inside: None,
-            events: Vec::new(),
             probe: None,
             counted_from: None,
         }
@@ -169,16 +133,15 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     /// Also keeps the derivatives along elements.
     fn with_inside(self) -> Self {
         Self {
-            inside: Some(Vec::new()),
+            carried: self.carried.with_inside(),
             ..self
         }
     }
 
     /// Returns the derivatives since the start or the last call, and counts them anew from here.
     pub(super) fn restart(&mut self) -> DMatrix<f64> {
-        let columns = self.columns();
-        (self.before.start, self.counted_from) = (None, None);
-        std::mem::replace(&mut self.before.state, DMatrix::identity(2 * N, columns))
+        self.counted_from = None;
+        self.carried.restart()
     }
 
     /// The derivative of the state at an event without action, including its time; derivatives are counted anew from
@@ -187,19 +150,21 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         &mut self,
         severed: &Severed<'_, 'm, N>,
     ) -> Result<DMatrix<f64>, TransitionError> {
-        let Across {
-            end: at,
-            more: rate,
-            ..
-        } = self.up_to(severed)?;
-        let times = self.times(severed, (&at, &rate))?;
+        let (reached, _) = self.up_to(severed)?;
+        let model = self.model.clone();
+        let event = severed.event;
+        let node = Node::of(event.t, &event.state(), event.v);
+        let velocity = model.velocity_along(&node);
+        let times = (self.carried).times(&*model, severed, &*velocity, &reached)?;
+        let Reached { at, rate } = reached;
         // The start of the element, differentiated by the state at the event at a fixed time.
         let back = self.inverse(&at, severed)?;
-        if let Some(moved) = &mut self.before.start {
+        let before = &mut self.carried.before;
+        if let Some(moved) = &mut before.start {
             let row = DMatrix::from_row_slice(1, moved.len(), moved) * &back;
             *moved = row.iter().copied().collect();
         }
-        self.before.state = &self.before.state * back;
+        before.state = &before.state * back;
         let mut matrix = at;
         for (mut column, dt) in matrix.column_iter_mut().zip(&times) {
             column.axpy(*dt, &rate.column(0), 1.0);
@@ -245,67 +210,9 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         Ok(before * (back * here.transpose()))
     }
 
-    /// The derivative of the time of an event by each column, from g(t*, y(t*)) = 0: ġ dt* = −δg. If g has jumped over
-    /// zero at the start of an element, by an impulse or an action, the time is that of the start.
-    fn times(
-        &self,
-        severed: &Severed<'_, 'm, N>,
-        (at, rate): (&DMatrix<f64>, &DMatrix<f64>),
-    ) -> Result<Vec<f64>, TransitionError> {
-        /// The least distance of g from zero after a jump, relative to its change in a step.
-        const JUMPED: f64 = 1e-6;
-
-        let event = severed.event;
-        let state = event.state();
-        let place = Place {
-            t: event.t,
-            state: &state,
-            v: &event.v,
-        };
-        let along = Along::new(&*self.model, place);
-        let slope = |change: &Change<N>| {
-            let velocity = along.velocity(change);
-            let value = &severed.watched.value;
-            value.slope(&along, event, change, &velocity)
-        };
-        let by_time = slope(&Change {
-            t: 1.0,
-            ..Change::of_column(rate, 0)
-        });
-        let value = severed.watched.value.at(&*self.model, event);
-        if !severed.inside && value.abs() > JUMPED * (severed.step * by_time).abs() {
-            let still = || vec![0.0; self.columns()];
-            return Ok(self.before.start.clone().unwrap_or_else(still));
-        }
-        let time = |column| {
-            let change = Change {
-                parameter: self.parameter(column),
-                ..Change::of_column(at, column)
-            };
-            -slope(&change) / by_time
-        };
-        let times: Vec<f64> = (0..self.columns()).map(time).collect();
-        if times.iter().all(|dt| dt.is_finite()) {
-            Ok(times)
-        } else {
-            Err(StepError::NonFinite.into())
-        }
-    }
-
     fn into_sensitive(self, motion: Motion<N>) -> Sensitive<N> {
-        let names = self.indices.iter();
-        let names = names.map(|index| self.model.parameter_name(*index).to_string());
-        let inside = self.inside.unwrap_or_default();
-        Sensitive::new(motion, names.collect(), self.nodes, self.events).with_inside(inside)
-    }
-
-    fn columns(&self) -> usize {
-        self.before.state.ncols()
-    }
-
-    /// The index of the parameter of a column; `None` for a column of the start.
-    fn parameter(&self, column: usize) -> Option<usize> {
-        self.indices.get(column.checked_sub(2 * N)?).copied()
+        let model = self.model;
+        (self.carried).into_sensitive(motion, |index| model.parameter_name(index))
     }
 
     /// The derivatives over the last element of `stepper`.
@@ -315,18 +222,19 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         more: &[Direction],
     ) -> Result<Across, TransitionError> {
         let mut directions = self.parameters.clone();
-        directions.extend(self.before.start.as_ref().map(|_| START));
+        let before = &self.carried.before;
+        directions.extend(before.start.as_ref().map(|_| START));
         directions.extend_from_slice(more);
         let all = 2 * N + directions.len();
         let mut entries = vec![0.0; 2 * N * all];
         let mut inside = Vec::new();
-        match &self.inside {
-            Some(_) => stepper.linearise_inside(&directions, &mut entries, &mut inside)?,
-            None => stepper.linearise(&directions, &mut entries)?,
+        match self.carried.keeps_inside() {
+            true => stepper.linearise_inside(&directions, &mut entries, &mut inside)?,
+            false => stepper.linearise(&directions, &mut entries)?,
         }
         let matrix = DMatrix::from_row_slice(2 * N, all, &entries);
         let more = matrix.columns(all - more.len(), more.len()).into_owned();
-        let end = self.before.through(&matrix, None);
+        let end = before.through(&matrix, None);
         // A product over many elements can overflow although each factor is finite.
         if !end.iter().all(|one| one.is_finite()) {
             return Err(StepError::NonFinite.into());
@@ -334,49 +242,34 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         Ok(Across { end, more, inside })
     }
 
-    /// Keeps the derivatives along the last element of `stepper`, whose end moves in time as given.
-    fn keep(
-        &mut self,
+    /// The derivatives along the last element of `stepper`.
+    fn along(
+        &self,
         stepper: &Stepper<'m, M, N>,
-        (start, end): (f64, f64),
-        slopes: Vec<InsideSlopes>,
-        ends: Option<&[f64]>,
-    ) {
-        let Some(mut inside) = self.inside.take() else {
-            return;
+        times: (f64, f64),
+        inside: Vec<InsideSlopes>,
+    ) -> Along {
+        let dense = stepper.dense(times.0, times.1);
+        let pieces = inside.into_iter().zip(dense.pieces());
+        let piece = |(slopes, piece): (InsideSlopes, &DenseElement<N>)| AlongPiece {
+            times: (piece.start(), piece.end()),
+            length: piece.length(),
+            slopes,
+            values: piece.coefficients().as_flattened().to_vec(),
         };
-        let dense = stepper.dense(start, end);
-        for (slopes, piece) in slopes.into_iter().zip(dense.pieces()) {
-            let times = (piece.start(), piece.end());
-            let moved = (self.before.start.is_some() || ends.is_some()).then(|| {
-                let still = vec![0.0; self.columns()];
-                let starts = self.before.start.as_ref().unwrap_or(&still);
-                let starts = RowDVector::from_row_slice(starts);
-                let ends = RowDVector::from_row_slice(ends.unwrap_or(&still));
-                let at = |t: f64| {
-                    let part = (t - start) / (end - start);
-                    &starts * (1.0 - part) + &ends * part
-                };
-                Moved {
-                    ends: [at(times.0), at(times.1)],
-                    values: piece.coefficients().as_flattened().to_vec(),
-                }
-            });
-            inside.push(Inside {
-                times,
-                length: piece.length(),
-                slopes,
-                before: self.before.clone(),
-                ends: ends.map(<[f64]>::to_vec),
-                moved,
-            });
+        Along {
+            times,
+            pieces: pieces.map(piece).collect(),
+            before: self.carried.before.clone(),
         }
-        self.inside = Some(inside);
     }
 
-    /// The derivatives at fixed time at an event that cuts an element, before its action, together with the time
-    /// derivative of the state.
-    fn up_to(&mut self, severed: &Severed<'_, '_, N>) -> Result<Across, TransitionError> {
+    /// The derivatives at an event that cuts an element, before its action, and those along the part of the element
+    /// before the event; the latter are `None` for an event at the start of the element.
+    fn up_to(
+        &mut self,
+        severed: &Severed<'_, '_, N>,
+    ) -> Result<(Reached, Option<Vec<InsideSlopes>>), TransitionError> {
         if severed.inside {
             let (element, control) = self.chosen;
             let mut probe = match self.probe.take() {
@@ -388,42 +281,18 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             probe.advance(severed.begin, length, &mut state, severed.impulses)?;
             let found = self.across(&mut probe, &[END]);
             self.probe = Some(probe);
-            return found;
+            let Across { end, more, inside } = found?;
+            let reached = Reached {
+                at: end,
+                rate: more,
+            };
+            return Ok((reached, Some(inside)));
         }
         // The start of the element.
         if const { !M::CONSTRAINTS.is_empty() } {
             return Err(TransitionError::NoStep);
         }
-        let event = severed.event;
-        let (z, mut first) = (
-            match M::FORM {
-                Form::Lagrangian => &event.v,
-                Form::Hamiltonian => &event.p,
-            },
-            First::ZERO,
-        );
-        self.model.first(event.t, &event.q, z, &mut first);
-        let sign = match M::FORM {
-            Form::Lagrangian => 1.0,
-            Form::Hamiltonian => -1.0,
-        };
-        let mut rate = DMatrix::zeros(2 * N, 1);
-        for a in 0..N {
-            rate[a] = sign * first.q[a] + first.force[a];
-            rate[N + a] = event.v[a];
-        }
-        let mut next = self.before.state.clone();
-        if let Some(moved) = &self.before.start {
-            // A later start shortens the time to the fixed end.
-            for (mut column, dt) in next.column_iter_mut().zip(moved) {
-                column.axpy(-dt, &rate.column(0), 1.0);
-            }
-        }
-        Ok(Across {
-            end: next,
-            more: rate,
-            inside: Vec::new(),
-        })
+        Ok((self.carried.at_start(&*self.model, severed.event), None))
     }
 }
 
@@ -435,118 +304,37 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
     ) -> Result<(), TransitionError> {
         let Across { end, inside, .. } = self.across(stepper, &[])?;
         self.count_from(passed.start, passed.before);
-        self.keep(
-            stepper,
-            (passed.start, passed.start + passed.h),
-            inside,
-            None,
-        );
-        (self.before.state, self.before.start) = (end, None);
+        if self.carried.keeps_inside() {
+            let times = (passed.start, passed.start + passed.h);
+            let along = self.along(stepper, times, inside);
+            self.carried.keep(along, None);
+        }
+        self.carried.passed(end);
         Ok(())
     }
 
     fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
-        if !self.indices.is_empty() {
-            let call = "run_sensitive";
-            return Err(RunErrorKind::SetUnsupported { call });
-        }
-        if let Some(dependent) = self.dependent.take() {
-            return Err(dependent);
-        }
+        self.carried.set()?;
         (self.model, self.probe) = (model.clone(), None);
         Ok(())
     }
 
     fn cut(&mut self, severed: &Severed<'_, 'm, N>) -> Result<(), TransitionError> {
-        let Across {
-            end: mut at,
-            more: rate,
-            inside,
-        } = self.up_to(severed)?;
+        let (reached, inside) = self.up_to(severed)?;
         self.count_from(severed.start, severed.before);
-        let event = severed.event;
-        let state = event.state();
         let model = self.model.clone();
-        let along = Along::new(
-            &*model,
-            Place {
-                t: event.t,
-                state: &state,
-                v: &event.v,
-            },
-        );
-        let times = self.times(severed, (&at, &rate))?;
-        if let Some(probe) = self.probe.take() {
-            let whole = (severed.start, event.t);
-            self.keep(&probe, whole, inside, Some(&times));
-            self.probe = Some(probe);
-        }
-        for (mut column, dt) in at.column_iter_mut().zip(&times) {
-            column.axpy(*dt, &rate.column(0), 1.0);
-        }
-        (self.acted, self.dependent) = (None, None);
-        if severed.goes_on {
-            let acting = Acting {
-                model: &*model,
-                along: &along,
-                severed,
-                at: &at,
-                rate: &rate,
-                times: &times,
-            };
-            self.acted = Some(acting.after(|column| self.parameter(column))?);
-            // If derivatives by parameters are asked for, actions that set parameters have been refused.
-            if self.indices.is_empty() {
-                self.dependent = acting.dependent();
-            }
-        }
-        self.before.state = at;
-        self.events.push((severed.number, times.clone()));
-        self.before.start = Some(times);
-        Ok(())
+        let inside = inside.filter(|_| self.carried.keeps_inside());
+        let times = (severed.start, severed.event.t);
+        let solved = self.probe.as_ref().zip(inside);
+        let along = solved.map(|(probe, inside)| self.along(probe, times, inside));
+        self.carried.cut(&*model, severed, reached, along)
     }
 
     fn acted(&mut self) {
-        if let Some(acted) = self.acted.take() {
-            self.before.state = acted;
-        }
+        self.carried.acted();
     }
 
     fn recorded(&mut self, node: &Node<N>) {
-        let state = node.state();
-        let place = Place {
-            t: node.t,
-            state: &state,
-            v: &node.v,
-        };
-        let along = Along::new(&*self.model, place);
-        let columns = self.columns();
-        let mut slopes = Slopes {
-            state: self.before.state.clone(),
-            velocity: DMatrix::zeros(N, columns),
-            outputs: DMatrix::zeros(self.model.columns(), columns),
-        };
-        for column in 0..columns {
-            let change = Change {
-                // The time of an event moves, too.
-                t: self
-                    .before
-                    .start
-                    .as_ref()
-                    .map_or(0.0, |moved| moved[column]),
-                parameter: self.parameter(column),
-                ..Change::of_column(&self.before.state, column)
-            };
-            let velocity = along.velocity(&change);
-            slopes
-                .velocity
-                .column_mut(column)
-                .copy_from_slice(&velocity);
-            if slopes.outputs.nrows() > 0 {
-                let outputs = along.outputs(&change, &velocity);
-                slopes.outputs.column_mut(column).copy_from_slice(&outputs);
-            }
-        }
-        self.nodes.push(slopes);
+        self.carried.recorded(&*self.model, node);
     }
 }

@@ -1,14 +1,15 @@
 //! The record of a run of a model of run-time length, from which its derivatives are computed.
 
 use super::acting;
-use super::events::Severed;
+use super::events::{Severed, Watched};
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::{Length, RunTimeLength};
-use crate::motion::{Motion, Node};
+use crate::motion::{Event, Motion, Node};
 use std::convert::identity;
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
+use tfe_runtime::Share;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::transition::TransitionError;
 
@@ -16,14 +17,20 @@ use tfe_runtime::transition::TransitionError;
 pub(super) const LONG_STEPS: &str =
     "models of run-time length where steps were so long that they were cut";
 
-/// An element of the run; the feature `sparse` is needed to solve it again.
+/// An element of the run, or the part of one up to an event; the feature `sparse` is needed to solve it again.
 #[cfg_attr(not(feature = "sparse"), expect(dead_code))]
 pub(super) struct Element {
+    /// The index of the element of the grid.
+    pub(super) number: usize,
     /// The start of the element as solved; a few ulps after a break.
     pub(super) t: f64,
     pub(super) h: f64,
+    /// The times of its start and its end.
+    pub(super) nodes: (f64, f64),
     pub(super) before: FamilyState,
     after: FamilyState,
+    /// Whether an event precedes the element, and whether one ends it, so that its start or its end moves in time.
+    pub(super) moves: (bool, bool),
     /// The impulse at its start, for a model with constraints.
     pub(super) kicked: Option<Kicked>,
 }
@@ -84,27 +91,146 @@ pub(super) fn is_same<const N: usize, L: Length<N>>(
     near(again.0, start.0, end.0) && near(again.1, start.1, end.1)
 }
 
-/// The elements so far, and the recorded nodes.
-#[derive(Default)]
-pub(super) struct Trail {
+/// An event that has cut an element: an owned copy of [`Severed`].
+#[cfg_attr(not(feature = "sparse"), expect(dead_code))]
+pub(super) struct Cut<'m> {
+    /// The index of the element of the grid.
+    pub(super) element: usize,
+    start: f64,
+    begin: f64,
+    length: f64,
+    step: f64,
+    before: FamilyState,
+    inside: bool,
+    watched: Watched<'m, 0, RunTimeLength>,
+    which: usize,
+    event: Event<0, RunTimeLength>,
+    number: usize,
+    goes_on: bool,
+}
+
+impl<'m> Cut<'m> {
+    fn of(severed: &Severed<'_, 'm, 0, RunTimeLength>, element: usize) -> Self {
+        Self {
+            element,
+            start: severed.start,
+            begin: severed.begin,
+            length: severed.length,
+            step: severed.step,
+            before: severed.before.clone(),
+            inside: severed.inside,
+            watched: severed.watched.clone(),
+            which: severed.which,
+            event: severed.event.clone(),
+            number: severed.number,
+            goes_on: severed.goes_on,
+        }
+    }
+
+    #[cfg(feature = "sparse")]
+    pub(super) fn severed(&self) -> Severed<'_, 'm, 0, RunTimeLength> {
+        Severed {
+            start: self.start,
+            begin: self.begin,
+            length: self.length,
+            step: self.step,
+            before: &self.before,
+            impulses: &[],
+            inside: self.inside,
+            watched: &self.watched,
+            which: self.which,
+            event: &self.event,
+            number: self.number,
+            goes_on: self.goes_on,
+        }
+    }
+}
+
+/// A record of what happened between two elements.
+#[cfg_attr(not(feature = "sparse"), expect(dead_code))]
+pub(super) enum Between<'m, M> {
+    /// A recorded node.
+    Node(Node<0, RunTimeLength>),
+    /// An event that cut the element before it, or that fell on the start of the next element.
+    Cut(Box<Cut<'m>>),
+    /// The action at that event has been performed.
+    Acted,
+    /// The model whose parameters were set at that event.
+    Set(Share<'m, M>),
+}
+
+/// The elements so far, and the records between them.
+pub(super) struct Trail<'m, M> {
     pub(super) elements: Vec<Element>,
-    /// Nodes with the number of elements before them, if they are kept.
-    pub(super) nodes: Vec<(usize, Node<0, RunTimeLength>)>,
+    /// Records with the number of elements before them. Nodes are recorded only if they are kept.
+    pub(super) between: Vec<(usize, Between<'m, M>)>,
     keeps_nodes: bool,
+    /// Whether events that end elements are recorded; otherwise they are refused.
+    takes_cuts: bool,
     /// Whether an event has ended an element.
     is_cut: bool,
-    /// The impulses on a model with constraints, and the state at the last node.
+    /// The number of elements of the grid so far.
+    reached: usize,
+    /// Whether an event precedes the next element.
+    is_moved: bool,
+    /// Whether an event fell on the end of the last element of the grid.
+    ends_moved: bool,
+    /// The impulses, and the state at the last node, which is kept only for a model with constraints.
     impulses: Vec<(f64, Vec<f64>)>,
     last: FamilyState,
 }
 
-impl Trail {
-    /// A trail that keeps the recorded nodes.
+impl<'m, M: family::Model> Trail<'m, M> {
+    pub(super) fn new() -> Self {
+        Self {
+            elements: Vec::new(),
+            between: Vec::new(),
+            keeps_nodes: false,
+            takes_cuts: false,
+            is_cut: false,
+            reached: 0,
+            is_moved: false,
+            ends_moved: false,
+            impulses: Vec::new(),
+            last: FamilyState::default(),
+        }
+    }
+
+    /// A trail that continues over events that end elements; for models with constraints, these are still refused.
+    pub(super) fn over_events() -> Self {
+        Self {
+            takes_cuts: !M::CONSTRAINED,
+            ..Self::new()
+        }
+    }
+
+    /// The same, for a trail that keeps the recorded nodes.
     pub(super) fn with_nodes() -> Self {
         Self {
             keeps_nodes: true,
-            ..Self::default()
+            ..Self::over_events()
         }
+    }
+
+    /// Refuses impulses at the start of an element if an event fell on the same node, since the time of the event
+    /// changes and that of the impulse does not.
+    fn check_kick(
+        &mut self,
+        element: (f64, f64),
+        before: &FamilyState,
+    ) -> Result<(), TransitionError> {
+        if !std::mem::take(&mut self.ends_moved) {
+            return Ok(());
+        }
+        let mut p = before.p.clone();
+        match acting::kick(&self.impulses, element, &mut p) {
+            true => Err(TransitionError::MovedImpulse { time: element.0 }),
+            false => Ok(()),
+        }
+    }
+
+    fn add(&mut self, between: Between<'m, M>) {
+        self.between.push((self.elements.len(), between));
     }
 
     /// The states around the impulses at the start of an element, if there are any.
@@ -121,8 +247,14 @@ impl Trail {
         motion: &Motion<0, RunTimeLength>,
         call: &'static str,
     ) -> Option<RunErrorKind> {
-        let of = if self.is_cut || motion.arcs().count() > 1 {
-            "models of run-time length whose events change the state or end the run"
+        let is_cut = self.is_cut || motion.arcs().count() > 1;
+        let of = if is_cut && !self.takes_cuts {
+            match M::CONSTRAINED {
+                true => {
+                    "models of run-time length with constraints whose events change the state or end the run"
+                }
+                false => "models of run-time length whose events change the state or end the run",
+            }
         } else if motion.statistics().cuts > 0 {
             LONG_STEPS
         } else if motion.statistics().kinks > 0 {
@@ -134,7 +266,7 @@ impl Trail {
     }
 }
 
-impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
+impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Runs over the span and records the elements, for a call that solves them again.
     ///
     /// # Errors
@@ -144,8 +276,8 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
         call: &'static str,
         start: FamilyState,
         span: &Range<f64>,
-        mut trail: Trail,
-    ) -> Result<(Motion<0, RunTimeLength>, Trail), RunError<0, RunTimeLength>> {
+        mut trail: Trail<'m, M>,
+    ) -> Result<(Motion<0, RunTimeLength>, Trail<'m, M>), RunError<0, RunTimeLength>> {
         let refused = |of: &'static str| {
             let motion = Motion::unasked(span.start, &start);
             RunError::new(RunErrorKind::Unsupported { call, of }, motion)
@@ -154,8 +286,8 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
             let of = "models of run-time length without the feature `sparse`";
             return Err(refused(of));
         }
+        trail.impulses.clone_from(&self.impulses);
         if const { M::CONSTRAINED } {
-            trail.impulses.clone_from(&self.impulses);
             trail.last.clone_from(&start);
         }
         let motion = self.drive(start, span, identity, Some(&mut trail))?;
@@ -166,35 +298,81 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
     }
 }
 
-impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail {
+impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M> {
     fn passed(
         &mut self,
         _: &mut family::Stepper<'m, M>,
         passed: &Passed<'_, 0, RunTimeLength>,
     ) -> Result<(), TransitionError> {
-        let kicked = if self.impulses.is_empty() {
-            None
-        } else {
-            self.kicked(passed)
+        let kicked = match M::CONSTRAINED && !self.impulses.is_empty() {
+            true => self.kicked(passed),
+            false => None,
         };
+        self.check_kick((passed.start, passed.h), passed.before)?;
         self.elements.push(Element {
+            number: self.reached,
             t: passed.begin,
             h: passed.h,
+            nodes: (passed.start, passed.start + passed.h),
             before: passed.before.clone(),
             after: passed.after.clone(),
+            moves: (self.is_moved, false),
             kicked,
         });
+        self.is_moved = false;
         Ok(())
     }
 
-    fn cut(&mut self, _: &Severed<'_, 'm, 0, RunTimeLength>) -> Result<(), TransitionError> {
+    fn cut(&mut self, severed: &Severed<'_, 'm, 0, RunTimeLength>) -> Result<(), TransitionError> {
         self.is_cut = true;
+        if !self.takes_cuts {
+            return Ok(());
+        }
+        self.check_kick((severed.start, severed.step), severed.before)?;
+        if severed.inside {
+            self.elements.push(Element {
+                number: self.reached,
+                t: severed.begin,
+                h: severed.length,
+                nodes: (severed.start, severed.event.t),
+                before: severed.before.clone(),
+                after: severed.event.state(),
+                moves: (self.is_moved, true),
+                kicked: None,
+            });
+        }
+        self.is_moved = true;
+        self.add(Between::Cut(Box::new(Cut::of(severed, self.reached))));
         Ok(())
+    }
+
+    fn acted(&mut self) {
+        if self.takes_cuts {
+            self.add(Between::Acted);
+        }
+    }
+
+    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
+        if self.takes_cuts {
+            self.add(Between::Set(model.clone()));
+        }
+        Ok(())
+    }
+
+    fn reached(
+        &mut self,
+        _: &mut family::Stepper<'m, M>,
+        _: f64,
+        _: &FamilyState,
+    ) -> ControlFlow<()> {
+        self.reached += 1;
+        self.ends_moved = self.is_moved;
+        ControlFlow::Continue(())
     }
 
     fn recorded(&mut self, node: &Node<0, RunTimeLength>) {
         if self.keeps_nodes {
-            self.nodes.push((self.elements.len(), node.clone()));
+            self.add(Between::Node(node.clone()));
         }
     }
 }

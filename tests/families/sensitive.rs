@@ -268,22 +268,17 @@ fn what_has_no_derivatives_is_told() {
         let v: Vec<f64> = event.v.iter().map(|v| -v).collect();
         Act::Restart(event.state_with_velocity(v))
     });
-    let error = bounced.run_sensitive(start.clone(), 0.0..3.0);
-    let text = told(error.expect_err("an event that changes the state"));
+    let loss = family::Loss::of_end(|q, _, _| q[1]);
+    let error = bounced.gradient(start.clone(), 0.0..3.0, &loss);
+    let text = told(error.expect_err("a gradient across an event that changes the state"));
     assert!(
-        text.ends_with("whose events change the state or end the run"),
+        text.starts_with("gradient") && text.ends_with("change the state or end the run"),
         "{text}"
     );
     let stopped = run.clone().on("wall", Crossing::Falling, |_| Act::Stop);
-    let error = stopped.run_sensitive(start.clone(), 0.0..3.0);
+    let error = stopped.gradient(start.clone(), 0.0..3.0, &loss);
     let text = told(error.expect_err("an event inside an element that ends the run"));
     assert!(text.ends_with("or end the run"), "{text}");
-    let error = stopped.run_linearised(start.clone(), 0.0..3.0);
-    let text = told(error.expect_err("the same for matrices"));
-    assert!(
-        text.starts_with("run_linearised") && text.ends_with("or end the run"),
-        "{text}"
-    );
     // Events that are only recorded change nothing.
     let recorded = run.clone().on("wall", Crossing::Either, |_| Act::Record);
     let with = recorded

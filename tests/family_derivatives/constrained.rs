@@ -22,7 +22,7 @@ use tfe::{Model, family};
     output(height) = y[n-1] + b*dot(x[0])^2,
 )]
 #[derive(Clone)]
-struct Rods {
+pub(super) struct Rods {
     n: usize,
     m: Vec<f64>,
     l: Vec<f64>,
@@ -47,7 +47,7 @@ struct Rods {
     output(height) = y[2] + b*dot(x[0])^2,
 )]
 #[derive(Clone)]
-struct ThreeRods {
+pub(super) struct ThreeRods {
     m: [f64; 3],
     l: [f64; 2],
     g: f64,
@@ -59,7 +59,7 @@ struct ThreeRods {
     b: f64,
 }
 
-fn rods() -> (Rods, ThreeRods) {
+pub(super) fn rods() -> (Rods, ThreeRods) {
     let (m, l) = ([1.0, 0.5, 2.0], [0.8, 0.6]);
     let (g, k, c, a, w, s, b) = (9.81, 0.7, 0.1, 0.2, 3.0, 0.3, 0.25);
     let long = Rods {
@@ -89,7 +89,7 @@ fn rods() -> (Rods, ThreeRods) {
 }
 
 /// An initial state on the constraints at time 0, where the support moves at a ω.
-fn start(fixed: &ThreeRods) -> State<6> {
+pub(super) fn start(fixed: &ThreeRods) -> State<6> {
     let angles = [0.4_f64, -0.3, 1.1];
     let lengths = [1.0, fixed.l[0], fixed.l[1]];
     let (mut x, mut y) = ([0.0; 3], [0.0; 3]);
@@ -112,7 +112,7 @@ fn start(fixed: &ThreeRods) -> State<6> {
     )
 }
 
-fn of_heap<const N: usize>(state: &State<N>) -> FamilyState {
+pub(super) fn of_heap<const N: usize>(state: &State<N>) -> FamilyState {
     FamilyState {
         q: state.q.to_vec(),
         p: state.p.to_vec(),

@@ -7,5 +7,6 @@ mod differences;
 mod largest;
 
 mod constrained;
+mod events;
 mod orbits;
 mod transitions;

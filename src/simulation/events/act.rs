@@ -4,7 +4,6 @@ use super::remodel::{Changed, Remodel};
 use super::settings::Settings;
 use super::value::{Function, Value};
 use crate::error::RunErrorKind;
-use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
 pub use crate::motion::Event;
 use crate::simulation::kind::Simulated;
@@ -12,7 +11,6 @@ use std::cell::Cell;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
-use tfe_runtime::{Model, State};
 
 /// Which changes of sign count as an event. The direction is as the run sees it: what rises in a run forwards in time
 /// falls in a run backwards.
@@ -260,42 +258,46 @@ where
 }
 
 /// A perturbed event, for difference quotients.
-pub(in crate::simulation) struct Near<const N: usize> {
+pub(in crate::simulation) struct Near<const N: usize, L: Length<N>> {
     pub(in crate::simulation) t: f64,
-    pub(in crate::simulation) state: State<N>,
+    pub(in crate::simulation) state: L::State,
     /// The change of the velocity due to the parameter.
-    pub(in crate::simulation) velocity: [f64; N],
+    pub(in crate::simulation) velocity: L::Vector,
     /// The index of the parameter and its increment.
     pub(in crate::simulation) parameter: Option<(usize, f64)>,
 }
 
 /// The state that an action makes of the state at a perturbed event; `None` if the action only records or stops.
-pub(in crate::simulation) fn state_after<M: Model<N>, const N: usize>(
+pub(in crate::simulation) fn state_after<M, L, const N: usize>(
     model: &M,
-    (on, value): (&On<'_, N>, &Value<'_, [f64; N]>),
-    event: &Event<N>,
-    near: &Near<N>,
-) -> Option<State<N>> {
+    (on, value): (&On<'_, N, L>, &Value<'_, L::Vector>),
+    event: &Event<N, L>,
+    near: &Near<N, L>,
+) -> Option<L::State>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     let (t, state) = (near.t, &near.state);
     let other = near
         .parameter
-        .and_then(|(index, larger)| model.with_parameter(index, model.parameter(index) + larger));
+        .and_then(|(index, larger)| model.with_value(index, model.parameter_value(index) + larger));
     let (model, larger) = match &other {
         Some(other) => (other, None),
         None => (model, near.parameter),
     };
     let found = model.velocity(t, state, &event.v);
-    let mut velocity = found.unwrap_or([f64::NAN; N]);
+    let mut velocity = found.unwrap_or_else(|| L::unknown(&event.v));
     if larger.is_some() {
-        for (v, more) in velocity.iter_mut().zip(near.velocity) {
-            *v += more;
-        }
+        let (v, more) = (velocity.as_ref(), near.velocity.as_ref());
+        velocity = L::from_fn(&event.v, |a| v[a] + more[a]);
     }
+    let (q, p) = L::parts(state);
     let event = Event {
         name: event.name.clone(),
         t,
-        q: state.q,
-        p: state.p,
+        q: q.clone(),
+        p: p.clone(),
         v: velocity,
         rises: event.rises,
     };

@@ -1,14 +1,12 @@
 //! The function whose zeros are the events.
 
 use crate::differences::{derivative_by_time, derivative_of_either, resolved};
-use crate::evaluate::Evaluate;
-use crate::length::{FixedLength, Length};
+use crate::length::Length;
 use crate::motion::Event;
 use crate::numbers::largest;
-use crate::sensitivity::slopes::{Along, Change};
+use crate::sensitivity::slopes::Change;
 use crate::simulation::kind::Simulated;
 use std::sync::Arc;
-use tfe_runtime::Model;
 use tfe_runtime::dual::Dual;
 
 /// A function of time, coordinates and velocities.
@@ -81,37 +79,52 @@ fn normal_of<L: Length<N>, const N: usize>(
     (!of_velocity).then_some((normal, drift))
 }
 
-impl<const N: usize> Value<'_, [f64; N]> {
+impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
     /// The value of g at an event.
-    pub(in crate::simulation) fn at<M: Model<N>>(&self, model: &M, event: &Event<N>) -> f64 {
+    pub(in crate::simulation) fn at<M, L, const N: usize>(
+        &self,
+        model: &M,
+        event: &Event<N, L>,
+    ) -> f64
+    where
+        M: Simulated<N, L>,
+        L: Length<N, Vector = V>,
+    {
         let Event { t, q, p, v, .. } = event;
         match self {
             Self::Column(column) => {
-                let mut values = vec![0.0; model.columns()];
-                <M as Evaluate<N, FixedLength>>::outputs(model, *t, (q, p), v, &mut values);
+                let mut values = vec![0.0; model.output_count()];
+                model.outputs(*t, (q, p), v, &mut values);
                 values[*column]
             }
             Self::Function(function) => function(*t, q, v),
         }
     }
 
-    /// The derivative of g along a change of the velocity.
-    pub(in crate::simulation) fn slope<M: Model<N>>(
+    /// The derivative of g along a change, whose change of the velocity is `velocity`.
+    pub(in crate::simulation) fn slope<M, L, const N: usize>(
         &self,
-        along: &Along<'_, M, N>,
-        event: &Event<N>,
-        change: &Change<N>,
-        velocity: &[f64; N],
-    ) -> f64 {
+        model: &M,
+        event: &Event<N, L>,
+        change: &Change<N, L>,
+        velocity: &V,
+    ) -> f64
+    where
+        M: Simulated<N, L>,
+        L: Length<N, Vector = V>,
+    {
         match self {
-            Self::Column(column) => along.outputs(change, velocity)[*column],
+            Self::Column(column) => {
+                let Event { t, q, p, v, .. } = event;
+                output_slopes(model, (*t, q, p, v), change, velocity)[*column]
+            }
             Self::Function(function) => {
                 let Event { t, q, v, .. } = event;
                 // An event is at a zero, possibly of the only coordinate: a scale taken from the rounding errors around
                 // it would be meaningless.
-                let part = |change: &[f64; N], of: &[f64; N], least: f64| {
-                    let size = largest(of).max(least);
-                    largest(change) / if size > 0.0 { size } else { 1.0 }
+                let part = |change: &V, of: &V, least: f64| {
+                    let size = largest(of.as_ref()).max(least);
+                    largest(change.as_ref()) / if size > 0.0 { size } else { 1.0 }
                 };
                 let size = |least: f64| {
                     let of_state = part(&change.q, q, least).max(part(velocity, v, least));
@@ -128,8 +141,9 @@ impl<const N: usize> Value<'_, [f64; N]> {
                         false => resolved(distance * rate, *t) / rate,
                     }
                 });
-                let moved = |from: &[f64; N], by: &[f64; N], s: f64| {
-                    std::array::from_fn(|a| from[a] + s * by[a])
+                let moved = |from: &V, by: &V, s: f64| {
+                    let by = by.as_ref();
+                    L::from_fn(from, |a| from.as_ref()[a] + s * by[a])
                 };
                 derivative_of_either(distances, |s| {
                     function(
@@ -141,4 +155,25 @@ impl<const N: usize> Value<'_, [f64; N]> {
             }
         }
     }
+}
+
+/// The changes of all outputs at a point of a motion, given the change of the velocity.
+pub(in crate::simulation) fn output_slopes<M, L, const N: usize>(
+    model: &M,
+    (t, q, p, v): (f64, &L::Vector, &L::Vector, &L::Vector),
+    change: &Change<N, L>,
+    velocity: &L::Vector,
+) -> Vec<f64>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    let time = Dual::new(t, change.t).by_parameter(change.parameter);
+    let z = match M::NEEDS_VELOCITY {
+        true => (v, velocity),
+        false => (p, &change.p),
+    };
+    let mut values = vec![Dual::ZERO; model.output_count()];
+    model.outputs_towards(time, (q, &change.q), z, &mut values);
+    values.iter().map(|value| value.slope).collect()
 }

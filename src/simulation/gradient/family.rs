@@ -10,7 +10,7 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
-    super::super::linearise::family::operator_failed, super::super::mesh::within,
+    super::super::mesh::within, super::super::retrace::operator_failed,
     super::super::trail::is_same, super::view::View, crate::error::RunErrorKind,
     crate::sensitivity::loss::Seen, std::convert::identity,
 };
@@ -79,7 +79,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             }
         }
         let run = run.record_every(1);
-        let (motion, trail) = run.trailed("gradient", start, &span, Trail::default())?;
+        let (motion, trail) = run.trailed("gradient", start, &span, Trail::new())?;
         #[cfg(feature = "sparse")]
         return run.pulled(motion, &trail, loss);
         // Such a model was refused above.
@@ -96,7 +96,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     fn pulled(
         &self,
         motion: Motion<0, RunTimeLength>,
-        trail: &Trail,
+        trail: &Trail<'m, M>,
         loss: &Loss<'_, 0, RunTimeLength>,
     ) -> Result<(f64, LossGradient<0, RunTimeLength>), RunError<0, RunTimeLength>> {
         let (value, seen) = match loss.seen(&motion, &*self.model) {
@@ -165,7 +165,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 "gradient",
                 before.state(),
                 &(before.t..after.t),
-                Trail::default(),
+                Trail::new(),
             );
             let Ok((again, trail)) = again else {
                 return Ok(None);
@@ -193,7 +193,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     fn back(
         &self,
         backwards: &mut family::Backwards<'_, M>,
-        (motion, trail): (&Motion<0, RunTimeLength>, &Trail),
+        (motion, trail): (&Motion<0, RunTimeLength>, &Trail<'m, M>),
         seen: &Seen,
     ) -> Result<(), RunErrorKind> {
         let mut view = View::new(&*self.model, seen, &motion.last().v);
@@ -222,7 +222,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         };
         go().map_err(|failure| match failure {
             Failure::Element(error) => {
-                let element = elements.get(number).map(|element| (number, element));
+                let element = elements.get(number);
                 operator_failed(error, element, "gradient")
             }
             Failure::Loss(kind) => kind,

@@ -162,12 +162,8 @@ impl<M: Model<N>, const N: usize> View<'_, M, N> {
         let Some(partials) = self.of_node(number) else {
             return 0.0;
         };
-        let state = node.state();
-        let place = Place {
-            t: node.t,
-            state: &state,
-            v: &node.v,
-        };
+        let Node { t, q, p, v } = node;
+        let place = Place { t: *t, q, p, v };
         let along = Along::new(self.model, place);
         let change = Change {
             t: 1.0,
@@ -236,7 +232,8 @@ fn add_moving<M: Model<N>, const N: usize>(
     } = point;
     let place = Place {
         t: *t,
-        state,
+        q: &state.q,
+        p: &state.p,
         v: velocity,
     };
     let along = Along::new(model, place);

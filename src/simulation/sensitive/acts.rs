@@ -2,23 +2,26 @@
 
 use crate::differences::{SIXTH, derivative, derivative_of_either};
 use crate::error::RunErrorKind;
-use crate::sensitivity::slopes::{Along, Change};
-use crate::simulation::checks::check_start;
+use crate::length::Length;
+use crate::numbers::largest;
+use crate::sensitivity::slopes::Change;
 use crate::simulation::events::act::{Act, Near, Occurrence, On, state_after};
 use crate::simulation::events::{Severed, Watched};
+use crate::simulation::kind::Simulated;
 use nalgebra::DMatrix;
 use std::sync::{Arc, Mutex, PoisonError};
+use tfe_runtime::StepError;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Model, State, StepError};
 
 /// The relative step of difference quotients. Their truncation error is below the rounding error, which is about 1e-13.
 const DISTANCE: f64 = 2e-3;
 
 /// An event with the derivatives of its state and of its time before the action.
-pub(super) struct Acting<'a, 'm, M, const N: usize> {
+pub(super) struct Acting<'a, 'm, M, const N: usize, L: Length<N>> {
     pub(super) model: &'a M,
-    pub(super) along: &'a Along<'a, M, N>,
-    pub(super) severed: &'a Severed<'a, 'm, N>,
+    /// The change of the velocity for a change at the event.
+    pub(super) velocity: &'a dyn Fn(&Change<N, L>) -> L::Vector,
+    pub(super) severed: &'a Severed<'a, 'm, N, L>,
     /// The derivatives of the state at the event, a column for each component of the start and each parameter.
     pub(super) at: &'a DMatrix<f64>,
     /// ẏ at the event.
@@ -28,13 +31,13 @@ pub(super) struct Acting<'a, 'm, M, const N: usize> {
 }
 
 /// How an event moves with the quantity of one column.
-struct Way<const N: usize> {
-    change: Change<N>,
+struct Way<const N: usize, L: Length<N>> {
+    change: Change<N, L>,
     time: f64,
     /// The index of the parameter, if the quantity is one.
     parameter: Option<usize>,
     /// The change of the velocity due to the parameter.
-    velocity: [f64; N],
+    velocity: L::Vector,
     /// The step of difference quotients.
     distance: f64,
     /// A longer step, which is tried first for a parameter alone: an action may add numbers of the size of 1 to it.
@@ -46,18 +49,27 @@ fn scale(size: f64) -> f64 {
     if size > 0.0 { size } else { 1.0 }
 }
 
-impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
+impl<M, const N: usize, L> Acting<'_, '_, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    fn coordinates(&self) -> usize {
+        self.at.nrows() / 2
+    }
+
     /// The derivatives after the action; `parameter` returns the parameter of a column.
     pub(super) fn after(
         &self,
         parameter: impl Fn(usize) -> Option<usize>,
     ) -> Result<DMatrix<f64>, TransitionError> {
+        let n = self.coordinates();
         let mut after = self.at.clone();
         for column in 0..self.times.len() {
             after.column_mut(column).fill(0.0);
             for way in self.ways(column, parameter(column)) {
                 if let Some(longer) = way.longer {
-                    for row in 0..2 * N {
+                    for row in 0..2 * n {
                         after[(row, column)] += self.alone(&way, longer, row)?;
                     }
                     continue;
@@ -65,9 +77,9 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
                 for (k, weight) in (1..).zip(SIXTH) {
                     let s = f64::from(k) * way.distance;
                     let (high, low) = (self.moved(&way, s)?, self.moved(&way, -s)?);
-                    for a in 0..N {
-                        after[(a, column)] += weight * (high.p[a] - low.p[a]) / way.distance;
-                        after[(N + a, column)] += weight * (high.q[a] - low.q[a]) / way.distance;
+                    let pairs = high.iter().zip(&low);
+                    for (row, (high, low)) in pairs.enumerate() {
+                        after[(row, column)] += weight * (high - low) / way.distance;
                     }
                 }
             }
@@ -75,19 +87,21 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         Ok(after)
     }
 
-    /// The state after the action for an event that has moved by `s`.
-    fn moved(&self, way: &Way<N>, s: f64) -> Result<State<N>, TransitionError> {
+    /// The state after the action for an event that has moved by `s`, in the order (p, q).
+    fn moved(&self, way: &Way<N, L>, s: f64) -> Result<Vec<f64>, TransitionError> {
         let by = (&self.severed.watched.on, &self.severed.watched.value);
         let found = state_after(self.model, by, self.severed.event, &self.near(way, s));
-        let found = found.filter(|found| check_start(found).is_ok());
-        found.ok_or(TransitionError::from(StepError::NonFinite))
+        let found = found.filter(|found| self.model.check_start(found, &[]).is_ok());
+        let found = found.ok_or(TransitionError::from(StepError::NonFinite))?;
+        let (q, p) = L::parts(&found);
+        Ok([p.as_ref(), q.as_ref()].concat())
     }
 
     /// The derivative by a parameter alone of a component of the state after the action, in the order (p, q).
-    fn alone(&self, way: &Way<N>, longer: f64, row: usize) -> Result<f64, TransitionError> {
+    fn alone(&self, way: &Way<N, L>, longer: f64, row: usize) -> Result<f64, TransitionError> {
         let slope = derivative_of_either([longer, way.distance], |s| {
-            let numbers = self.moved(way, s).map(|state| [state.p, state.q]);
-            numbers.map_or(f64::NAN, |numbers| numbers.as_flattened()[row])
+            let numbers = self.moved(way, s);
+            numbers.map_or(f64::NAN, |numbers| numbers[row])
         });
         match slope.is_finite() {
             true => Ok(slope),
@@ -105,7 +119,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         // Records the values that the action sets at each call.
         let seen = Arc::new(Mutex::new(None));
         let (act, sets) = (Arc::clone(&on.act), Arc::clone(&seen));
-        let watched = move |event: &Occurrence<'_, N>| {
+        let watched = move |event: &Occurrence<'_, N, L>| {
             let act = act(event);
             if let Act::Set(settings) = &act {
                 let mut sets = sets.lock().unwrap_or_else(PoisonError::into_inner);
@@ -117,11 +131,12 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
             act: Arc::new(watched),
             ..on.clone()
         };
-        let set = |way: &Way<N>, s: f64| {
+        let set = |way: &Way<N, L>, s: f64| {
             let near = self.near(way, s);
             let _ = state_after(self.model, (&on, value), self.severed.event, &near);
             seen.lock().unwrap_or_else(PoisonError::into_inner).take()
         };
+        let names = self.model.parameter_names();
         for way in (0..self.times.len()).filter_map(|column| self.motion(column)) {
             for (place, (name, value)) in set(&way, 0.0)?.into_iter().enumerate() {
                 // NaN if the action sets something else nearby.
@@ -131,8 +146,8 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
                     own.map_or(f64::NAN, |(_, value)| *value)
                 };
                 let change = derivative(way.distance, nearby) * way.distance / DISTANCE;
-                let known = self.model.find_parameter(&name);
-                let before = known.map_or(0.0, |index| self.model.parameter(index));
+                let known = names.iter().position(|own| own.is(&name));
+                let before = known.map_or(0.0, |index| self.model.parameter_value(index));
                 let size = value.abs().max(before.abs());
                 if !(change.abs() <= ROUNDINGS * size) {
                     return Some(RunErrorKind::SetByState {
@@ -148,7 +163,7 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
 
     /// How the event moves with a column. Motion and parameter are moved together if one step suits both, so that
     /// constraints that contain the parameter stay satisfied; otherwise one after the other.
-    fn ways(&self, column: usize, parameter: Option<usize>) -> Vec<Way<N>> {
+    fn ways(&self, column: usize, parameter: Option<usize>) -> Vec<Way<N, L>> {
         /// The largest ratio of the two steps. A step shorter than necessary by this factor loses two digits; in a step
         /// suited to a tiny parameter, the state would change by rounding only.
         const TOGETHER: f64 = 100.0;
@@ -157,15 +172,13 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
         let Some(index) = parameter else {
             return motion.into_iter().collect();
         };
-        let size = scale(self.model.parameter(index).abs());
+        let size = scale(self.model.parameter_value(index).abs());
+        let like = &self.severed.event.q;
         let own = Way {
-            change: Change::ZERO,
+            change: Change::by(None, like),
             time: 0.0,
             parameter,
-            velocity: self.along.velocity(&Change {
-                parameter,
-                ..Change::ZERO
-            }),
+            velocity: (self.velocity)(&Change::by(parameter, like)),
             distance: DISTANCE * size,
             longer: None,
         };
@@ -185,38 +198,42 @@ impl<M: Model<N>, const N: usize> Acting<'_, '_, M, N> {
     }
 
     /// How the event moves with a column at fixed parameters; `None` if it does not.
-    fn motion(&self, column: usize) -> Option<Way<N>> {
+    fn motion(&self, column: usize) -> Option<Way<N, L>> {
         let event = self.severed.event;
-        let largest = |values: &[f64; N]| values.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let largest = |values: &L::Vector| largest(values.as_ref());
         // At an event something vanishes, possibly the only coordinate; the change over a step is then the better
         // scale.
-        let rate = Change::<N>::of_column(self.rate, 0);
+        let rate = Change::<N, L>::of_column(&event.q, self.rate, 0);
         let step = self.severed.step.abs();
         let q = scale(largest(&event.q).max(step * largest(&rate.q)));
         let p = scale(largest(&event.p).max(step * largest(&rate.p)));
-        let change = Change::<N>::of_column(self.at, column);
+        let change = Change::<N, L>::of_column(&event.q, self.at, column);
         let size = (largest(&change.q) / q).max(largest(&change.p) / p);
         let time = self.times[column];
         (size != 0.0 || time != 0.0).then(|| Way {
             change,
             time,
             parameter: None,
-            velocity: [0.0; N],
+            velocity: L::zero(&event.v),
             distance: DISTANCE / scale(size),
             longer: None,
         })
     }
 
     /// The event moved by `s`.
-    fn near(&self, way: &Way<N>, s: f64) -> Near<N> {
+    fn near(&self, way: &Way<N, L>, s: f64) -> Near<N, L> {
         let event = self.severed.event;
+        let moved = |from: &L::Vector, by: &L::Vector| {
+            let by = by.as_ref();
+            L::from_fn(from, |a| from.as_ref()[a] + s * by[a])
+        };
         Near {
             t: event.t + s * way.time,
-            state: State {
-                q: std::array::from_fn(|a| event.q[a] + s * way.change.q[a]),
-                p: std::array::from_fn(|a| event.p[a] + s * way.change.p[a]),
-            },
-            velocity: way.velocity.map(|v| s * v),
+            state: L::state(
+                moved(&event.q, &way.change.q),
+                moved(&event.p, &way.change.p),
+            ),
+            velocity: L::from_fn(&event.v, |a| s * way.velocity.as_ref()[a]),
             parameter: way.parameter.map(|index| (index, s)),
         }
     }

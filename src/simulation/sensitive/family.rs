@@ -9,13 +9,15 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
-    super::super::linearise::family::operator_failed,
-    crate::motion::{Motion, Node},
-    crate::sensitivity::Slopes,
-    crate::sensitivity::inside::Inside,
-    crate::sensitivity::run_time::Along,
+    super::super::retrace::Retrace,
+    super::super::trail::{Between, Element},
+    super::carried::{Along, AlongPiece, Carried, Reached},
+    crate::error::RunErrorKind,
+    crate::motion::Motion,
+    crate::sensitivity::inside::Before,
     nalgebra::{DMatrix, DVector},
-    tfe_runtime::StepError,
+    tfe_runtime::family::{OperatorError, TransitionOperator},
+    tfe_runtime::{InsideSlopes, StepError},
 };
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
@@ -25,12 +27,15 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Parameters are the fields that are numbers, and the elements of fields that are vectors of numbers. Every
     /// element is solved once more with sparse factors, and then once for each number of the start and each parameter.
     /// Each recorded node keeps 2n (2n + parameters) numbers, and as many for velocities and outputs;
-    /// [`record_every`](Self::record_every) keeps fewer nodes.
+    /// [`record_every`](Self::record_every) keeps fewer nodes. The functions given to [`on`](Self::on) are called
+    /// several times with nearby states, for differences of sixth order, as for models of fixed size.
     ///
     /// # Errors
-    /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported)
-    /// without the feature `sparse`, for events that change the state or end the run, and if steps were so long that
-    /// they had to be cut.
+    /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`](crate::RunErrorKind::Transition) if an
+    /// event has no derivative; [`RunErrorKind::SetUnsupported`](crate::RunErrorKind::SetUnsupported) if an event
+    /// [sets](crate::Act::Set) a parameter. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the
+    /// feature `sparse`; with constraints, for events that change the state or end the run; and if steps were so long
+    /// that they had to be cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_sensitive(
         &self,
@@ -53,111 +58,194 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     fn differentiated(
         &self,
         motion: Motion<0, RunTimeLength>,
-        trail: &Trail,
+        trail: &Trail<'m, M>,
     ) -> Result<Sensitive<0, RunTimeLength>, RunError<0, RunTimeLength>> {
         let model = &*self.model;
         let parameters: Vec<usize> = (0..model.parameters()).collect();
-        let size = 2 * model.len();
-        let mut current = DMatrix::identity(size, size + parameters.len());
-        let mut nodes = trail.nodes.iter().peekable();
-        let mut slopes = Vec::with_capacity(trail.nodes.len());
-        let mut record = |passed: usize, current: &DMatrix<f64>| {
-            while let Some((_, node)) = nodes.next_if(|(own, _)| *own == passed) {
-                slopes.push(slopes_at(model, node, current));
-            }
+        let carrying = Carrying::new(model.len(), &parameters);
+        let mut course = Course {
+            carrying: match self.record_every {
+                1 => carrying.with_inside(),
+                _ => carrying,
+            },
+            parameters: &parameters,
         };
-        record(0, &current);
-        let keeps = self.record_every == 1;
-        let mut inside = Vec::new();
-        let mut passed = 0;
-        let each = |transition: family::TransitionOperator| {
-            let element = &trail.elements[passed];
-            element.check(transition.end(), self.control.tolerance)?;
-            if let Some(kicked) = &element.kicked {
-                let kick = family::Kick::of(model, element.t, &kicked.with, &parameters)?;
-                for mut column in current.column_iter_mut() {
-                    kick.apply(column.as_mut_slice());
-                }
-                let by_parameters = kick.by_parameters().iter();
-                for (by, mut column) in by_parameters.zip(current.column_iter_mut().skip(size)) {
-                    let mut of_p = column.rows_mut(0, size / 2);
-                    of_p += DVector::from_column_slice(by);
-                }
-            }
-            let mut next = DMatrix::zeros(current.nrows(), current.ncols());
-            let mut along = Vec::new();
-            for (from, mut to) in current.column_iter().zip(next.column_iter_mut()) {
-                let from: Vec<f64> = from.iter().copied().collect();
-                let (mut end, mut own) = (vec![0.0; size], Vec::new());
-                transition.apply_inside(&from, &mut end, keeps.then_some(&mut own))?;
-                to.copy_from_slice(&end);
-                along.extend(own);
-            }
-            for (by, mut to) in transition
-                .by_parameters()
-                .iter()
-                .zip(next.column_iter_mut().skip(size))
-            {
-                to += DVector::from_column_slice(by);
-            }
-            // A product over many elements can overflow although each factor is finite.
-            if !next.iter().all(|one| one.is_finite()) {
-                return Err(StepError::NonFinite.into());
-            }
-            if keeps {
-                let rows = along.len() / current.ncols();
-                let mut along = DMatrix::from_vec(rows, current.ncols(), along);
-                let by_parameters = transition.inside_by_parameters().iter();
-                for (by, mut to) in by_parameters.zip(along.column_iter_mut().skip(size)) {
-                    to += DVector::from_column_slice(by);
-                }
-                let times = (element.t, element.t + element.h);
-                inside.push(Inside::whole(times, element.h, &current, &along));
-            }
-            current = next;
-            passed += 1;
-            record(passed, &current);
-            Ok(())
-        };
-        let steps = trail.elements.iter();
-        let steps = steps.map(|element| (element.t, element.h, &element.before));
-        let asked = (0.0, &parameters[..]);
-        let element = self.chosen_element();
-        let found = family::TransitionOperator::of_steps_by(model, element, asked, steps, each);
-        if let Err((number, error)) = found {
-            let element = Some((number, &trail.elements[number]));
-            let kind = operator_failed(error, element, "run_sensitive");
+        let done = self.retrace("run_sensitive", trail, &parameters, &mut course);
+        if let Err(kind) = done {
             return Err(RunError::new(kind, motion));
         }
-        let names = parameters.iter();
-        let names = names.map(|index| model.parameter_name(*index).to_string());
-        let sensitive = Sensitive::new(motion, names.collect(), slopes, Vec::new());
-        Ok(sensitive.with_inside(inside))
+        let carried = course.carrying.carried;
+        Ok(carried.into_sensitive(motion, |index| model.parameter_name(index)))
     }
 }
 
-/// The derivatives at a node, from those of its state.
+/// Carries the derivatives by the parameters along a run.
 #[cfg(feature = "sparse")]
-fn slopes_at<M: family::Model>(
-    model: &M,
-    node: &Node<0, RunTimeLength>,
-    current: &DMatrix<f64>,
-) -> Slopes {
-    let along = Along::new(model, node);
-    let (n, columns) = (model.len(), current.ncols());
-    let mut slopes = Slopes {
-        state: current.clone(),
-        velocity: DMatrix::zeros(n, columns),
-        outputs: DMatrix::zeros(model.columns(), columns),
-    };
-    for (column, change) in current.column_iter().enumerate() {
-        let change: Vec<f64> = change.iter().copied().collect();
-        let (velocity, outputs) = along.slopes(&change, column.checked_sub(2 * n));
-        slopes
-            .velocity
-            .column_mut(column)
-            .copy_from_slice(&velocity);
-        slopes.outputs.column_mut(column).copy_from_slice(&outputs);
+struct Course<'p> {
+    carrying: Carrying,
+    parameters: &'p [usize],
+}
+
+#[cfg(feature = "sparse")]
+impl<'m, M: family::Model> Retrace<'m, M> for Course<'_> {
+    fn element(
+        &mut self,
+        model: &M,
+        element: &Element,
+        transition: &TransitionOperator,
+    ) -> Result<(), OperatorError> {
+        let parameters = self.parameters;
+        self.carrying.pass(model, element, transition, parameters)
     }
-    slopes
+
+    fn between(&mut self, model: &M, between: &Between<'m, M>) -> Result<(), RunErrorKind> {
+        self.carrying.between(model, between)
+    }
+}
+
+/// Carries derivatives over the elements of a trail and over the events between them.
+#[cfg(feature = "sparse")]
+pub(in crate::simulation) struct Carrying {
+    pub(in crate::simulation) carried: Carried,
+    /// The derivatives at the event that ends the last element, and those along that element, if they are kept.
+    cut: Option<(Reached, Option<Along>)>,
+}
+
+#[cfg(feature = "sparse")]
+impl Carrying {
+    /// The derivatives at the start of a run, by the start and by parameters of given indices.
+    pub(in crate::simulation) fn new(coordinates: usize, parameters: &[usize]) -> Self {
+        Self {
+            carried: Carried::new(coordinates, parameters),
+            cut: None,
+        }
+    }
+
+    fn with_inside(self) -> Self {
+        Self {
+            carried: self.carried.with_inside(),
+            ..self
+        }
+    }
+
+    /// Carries the derivatives over an element; `parameters` are the indices of those of `transition`.
+    pub(in crate::simulation) fn pass<M: family::Model>(
+        &mut self,
+        model: &M,
+        element: &Element,
+        transition: &TransitionOperator,
+        parameters: &[usize],
+    ) -> Result<(), OperatorError> {
+        let keeps = self.carried.keeps_inside();
+        let Before { state, start } = &mut self.carried.before;
+        let (size, columns) = state.shape();
+        if let Some(kicked) = &element.kicked {
+            let kick = family::Kick::of(model, element.t, &kicked.with, parameters)?;
+            for mut column in state.column_iter_mut() {
+                kick.apply(column.as_mut_slice());
+            }
+            let by_parameters = kick.by_parameters().iter();
+            for (by, mut column) in by_parameters.zip(state.column_iter_mut().skip(size)) {
+                let mut of_p = column.rows_mut(0, size / 2);
+                of_p += DVector::from_column_slice(by);
+            }
+        }
+        let (ends, count) = (element.moves.1, parameters.len());
+        let start = start.as_ref().filter(|_| element.moves.0);
+        // Adds the derivatives by parameters, and those by the start time of the element if an event moves it.
+        let add = |by: &[Vec<f64>], to: &mut DMatrix<f64>| {
+            for (by, mut to) in by.iter().take(count).zip(to.column_iter_mut().skip(size)) {
+                to += DVector::from_column_slice(by);
+            }
+            let Some((by, times)) = by.get(count).zip(start) else {
+                return;
+            };
+            let by = DVector::from_column_slice(by);
+            for (dt, mut to) in times.iter().zip(to.column_iter_mut()) {
+                to.axpy(*dt, &by, 1.0);
+            }
+        };
+        let mut next = DMatrix::zeros(size, columns);
+        let mut along = Vec::new();
+        for (from, mut to) in state.column_iter().zip(next.column_iter_mut()) {
+            let from: Vec<f64> = from.iter().copied().collect();
+            let (mut end, mut own) = (vec![0.0; size], Vec::new());
+            transition.apply_inside(&from, &mut end, keeps.then_some(&mut own))?;
+            to.copy_from_slice(&end);
+            along.extend(own);
+        }
+        add(transition.by_parameters(), &mut next);
+        // A product over many elements can overflow although each factor is finite.
+        if !next.iter().all(|one| one.is_finite()) {
+            return Err(StepError::NonFinite.into());
+        }
+        let along = keeps.then(|| {
+            let rows = along.len() / columns;
+            let mut slopes = DMatrix::from_vec(rows, columns, along);
+            let by = transition.inside_by_parameters();
+            add(by, &mut slopes);
+            let mut start = state.clone();
+            if let Some(by_end) = by.last().filter(|_| ends) {
+                slopes = slopes.insert_column(columns, 0.0);
+                slopes.column_mut(columns).copy_from_slice(by_end);
+                start = start.insert_column(columns, 0.0);
+            }
+            let rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
+            let piece = AlongPiece {
+                times: element.nodes,
+                length: element.h,
+                slopes: InsideSlopes {
+                    start: rows(&start),
+                    coefficients: rows(&slopes),
+                },
+                values: transition.dense().coefficients(),
+            };
+            Along {
+                times: element.nodes,
+                pieces: vec![piece],
+                before: Before {
+                    state: DMatrix::identity(size, columns),
+                    start: None,
+                },
+            }
+        });
+        let rate = transition.by_parameters().last().filter(|_| ends);
+        if let Some(rate) = rate {
+            let rate = DMatrix::from_column_slice(size, 1, rate);
+            self.cut = Some((Reached { at: next, rate }, along));
+            return Ok(());
+        }
+        if let Some(along) = along {
+            self.carried.keep(along, None);
+        }
+        self.carried.passed(next);
+        Ok(())
+    }
+
+    /// Processes a record between elements.
+    pub(in crate::simulation) fn between<M: family::Model>(
+        &mut self,
+        model: &M,
+        between: &Between<'_, M>,
+    ) -> Result<(), RunErrorKind> {
+        match between {
+            Between::Node(node) => self.carried.recorded(model, node),
+            Between::Acted => self.carried.acted(),
+            Between::Set(_) => return self.carried.set(),
+            Between::Cut(cut) => {
+                let severed = cut.severed();
+                let solved = self.cut.take();
+                let (reached, along) =
+                    solved.unwrap_or_else(|| (self.carried.at_start(model, severed.event), None));
+                let done = self.carried.cut(model, &severed, reached, along);
+                return done.map_err(|source| RunErrorKind::Transition {
+                    element: cut.element,
+                    time: severed.start,
+                    step: severed.length,
+                    source,
+                });
+            }
+        }
+        Ok(())
+    }
 }

@@ -131,6 +131,17 @@ impl DenseElement {
         }
     }
 
+    /// The Legendre coefficients of dq/dτ, a row of n each, followed by those of dp/dτ; empty for an element that was
+    /// [cut](crate::Statistics::cuts), and for one with constraints, whose momenta jump.
+    #[must_use]
+    pub fn coefficients(&self) -> Vec<f64> {
+        match &self.momenta {
+            Momenta::Rates(rates) => [&self.rates[..], rates].concat(),
+            #[cfg(feature = "sparse")]
+            Momenta::Values(_) => Vec::new(),
+        }
+    }
+
     /// The pieces of the element: the element itself, unless the step was [cut](crate::Statistics::cuts).
     #[must_use]
     pub fn pieces(&self) -> &[Self] {

@@ -1,5 +1,6 @@
 //! The derivative of one step of a model of run-time length, as an operator: implicit differentiation (T-30).
 
+mod directions;
 mod error;
 pub(super) mod pull;
 
@@ -14,7 +15,7 @@ use super::pattern::Pattern;
 use super::projection::{Explicit, Places};
 use super::rates::Rates;
 use super::view::View;
-use crate::condense::add_multiple;
+use crate::condense::{Direction, Parameter, add_multiple};
 use crate::element::Element;
 use crate::error::StepError;
 use crate::model::Form;
@@ -146,6 +147,30 @@ impl TransitionOperator {
         element: Element,
         (damping, parameters): (f64, &[usize]),
         steps: impl IntoIterator<Item = (f64, f64, &'s FamilyState)>,
+        each: impl FnMut(Self) -> Result<(), OperatorError>,
+    ) -> Result<(), (usize, OperatorError)> {
+        let by = |&index: &usize| Direction {
+            parameter: Some(Parameter::Any(index)),
+            ..Direction::default()
+        };
+        let directions: Vec<Direction> = parameters.iter().map(by).collect();
+        let steps = steps.into_iter().map(|step| (step, &directions[..]));
+        Self::of_steps_towards(model, element, damping, steps, each)
+    }
+
+    /// The same, with the derivatives along directions that may differ between steps;
+    /// [`by_parameters`](Self::by_parameters) then has one entry for each direction. The index of a [`Parameter`] of
+    /// either variant is that among all parameters of the model. For models with constraints, directions cannot change
+    /// the start time or the length of a step.
+    ///
+    /// # Errors
+    /// As [`of_steps_by`](Self::of_steps_by); [`ModelError::ConstraintsNotSupported`] for a direction that changes the
+    /// start time or the length of a step of a model with constraints.
+    pub fn of_steps_towards<'s, M: Model>(
+        model: &M,
+        element: Element,
+        damping: f64,
+        steps: impl IntoIterator<Item = ((f64, f64, &'s FamilyState), impl AsRef<[Direction]>)>,
         mut each: impl FnMut(Self) -> Result<(), OperatorError>,
     ) -> Result<(), (usize, OperatorError)> {
         let refused = |error: OperatorError| (0, error);
@@ -155,10 +180,10 @@ impl TransitionOperator {
         let mut rates = rates.map_err(|error| refused(error.into()))?;
         rates.begin_anywhere();
         let ground = Ground::of(&view, table);
-        for (number, (t, h, state)) in steps.into_iter().enumerate() {
+        for (number, ((t, h, state), directions)) in steps.into_iter().enumerate() {
             let transition = Self::next(&view, &mut rates, &ground, state, (t, h));
             let done = transition.and_then(|mut transition| {
-                transition.answer(&view, &rates, (t, h), parameters);
+                transition.answer(&view, &rates, (t, h), directions.as_ref())?;
                 each(transition)
             });
             done.map_err(|error| (number, error))?;
@@ -250,84 +275,14 @@ impl TransitionOperator {
         Ok(transition)
     }
 
-    /// Computes the derivatives by the length and by the damping.
-    fn differentiate<V: Model>(&mut self, rates: &Rates<&V>) {
-        let scheme = self.table.view();
-        let count = scheme.unknowns();
-        let sum = |weights: &[f64], a: usize| -> f64 {
-            let rates = &rates.unknowns()[a * count..(a + 1) * count];
-            weights.iter().zip(rates).map(|(w, rate)| w * rate).sum()
-        };
-        let h = self.h;
-        let impulse = rates.impulse_of_start().iter().map(|impulse| impulse / h);
-        let stretched = Explicit::impulse(impulse.collect());
-        let by_length = self.respond(&Change {
-            shift: |l: usize, a: usize| sum(&scheme.position[l * count..(l + 1) * count], a),
-            lift: |_, _| 0.0,
-            push: |l: usize, a: usize| rates.points[l].force[a] / h,
-            impulse: |_| 0.0,
-            advance: |a| sum(scheme.advance, a),
-            explicit: self.held.as_ref().map(|_| &stretched),
-        });
-        let by_damping = self.respond(&Change {
-            shift: |_, _| 0.0,
-            lift: |_, _| 0.0,
-            push: |l: usize, a: usize| rates.points[l].v[a],
-            impulse: |_| 0.0,
-            advance: |_| 0.0,
-            explicit: None,
-        });
-        (self.by_length, self.by_damping) = (by_length, by_damping);
-    }
-
-    /// Computes the derivatives by parameters.
-    fn answer<M: Model>(
-        &mut self,
-        view: &View<'_, M>,
-        rates: &Rates<&View<'_, M>>,
-        (t, h): (f64, f64),
-        parameters: &[usize],
-    ) {
-        let n = self.end.q.len();
-        let (still, mut unused) = (vec![0.0; n], vec![0.0; n]);
-        for parameter in parameters {
-            let (mut momenta, mut forces) = (Vec::new(), Vec::new());
-            for (l, point) in rates.points.iter().enumerate() {
-                let time = t + h * self.table.view().nodes[l];
-                let mut by = view.by_parameter(time, &point.q, &point.v, *parameter);
-                self.bend(l, &still, &by.velocity, &mut unused, &mut by.force);
-                momenta.push(by.momentum);
-                forces.push(by.force);
-            }
-            let explicit = self.held.as_ref().map(|held| {
-                let scheme = self.table.view();
-                let solved = rates.solved(&scheme, (t, h), &self.pattern);
-                let (q, v) = solved.end;
-                let end = view.by_parameter(t + h, q, v, *parameter).momentum;
-                held.explicit(view, *parameter, &solved, end, &mut forces)
-            });
-            let mut inside = Vec::new();
-            let change = Change {
-                shift: |_, _| 0.0,
-                lift: |l: usize, a: usize| momenta[l][a],
-                push: |l: usize, a: usize| forces[l][a],
-                impulse: |_| 0.0,
-                advance: |_| 0.0,
-                explicit: explicit.as_ref(),
-            };
-            let end = self.respond_inside(&change, Some(&mut inside));
-            self.by_parameters.push(end);
-            self.inside_by_parameters.push(inside);
-        }
-    }
-
-    /// ∂(p₁, q₁)/∂a, one for each requested parameter.
+    /// ∂(p₁, q₁)/∂a, one for each requested parameter or direction.
     #[must_use]
     pub fn by_parameters(&self) -> &[Vec<f64>] {
         &self.by_parameters
     }
 
-    /// The derivatives of the Legendre coefficients of the element's polynomials by the same parameters: of dq/dτ, a row of n each, then of dp/dτ.
+    /// The derivatives of the Legendre coefficients of the element's polynomials by the same parameters or directions:
+    /// of dq/dτ, a row of n each, then of dp/dτ.
     #[must_use]
     pub fn inside_by_parameters(&self) -> &[Vec<f64>] {
         &self.inside_by_parameters
@@ -343,6 +298,12 @@ impl TransitionOperator {
     #[must_use]
     pub fn end(&self) -> &FamilyState {
         &self.end
+    }
+
+    /// The polynomial of the step.
+    #[must_use]
+    pub fn dense(&self) -> &DenseElement {
+        &self.dense
     }
 
     /// The polynomial of the step, dropping the derivative.

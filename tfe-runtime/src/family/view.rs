@@ -66,6 +66,12 @@ impl<'m, M: Model> View<'m, M> {
 
     /// The effect of a parameter at a place.
     pub(super) fn by_parameter(&self, t: f64, q: &[f64], v: &[f64], parameter: usize) -> Answer {
+        let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
+        self.answer(time, q, v)
+    }
+
+    /// The effect of the time at a place, if the time has a derivative, and of the parameter that it carries.
+    pub(super) fn answer(&self, time: Dual, q: &[f64], v: &[f64]) -> Answer {
         let still = |values: &[f64]| -> Vec<Dual> {
             let duals = values.iter().map(|value| Dual::new(*value, 0.0));
             duals.collect()
@@ -81,7 +87,6 @@ impl<'m, M: Model> View<'m, M> {
             q: &mut slope,
             force: &mut force,
         };
-        let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
         let momenta = self.momenta(v);
         let (taken, sign) = match self.is_hamiltonian() {
             true => (&momenta[..], -1.0),
@@ -129,7 +134,7 @@ impl<'m, M: Model> View<'m, M> {
     }
 }
 
-/// The effect of a parameter at fixed coordinates and velocities.
+/// The effect of a parameter, or of the time, at fixed coordinates and velocities.
 pub(super) struct Answer {
     /// ∂L_v/∂a
     pub(super) momentum: Vec<f64>,

@@ -1,0 +1,82 @@
+//! Models of either kind of length, as seen by derivatives along runs.
+
+use super::slopes::{Along, Change, Place};
+use crate::evaluate::Evaluate;
+use crate::length::{FixedLength, Length};
+use crate::motion::Node;
+use tfe_runtime::{First, Form, Model};
+#[cfg(feature = "sparse")]
+use {
+    super::run_time, crate::length::RunTimeLength, tfe_runtime::family,
+    tfe_runtime::family::Gradient,
+};
+
+/// The change of the velocity, δv, as a function of a change at a point.
+pub(crate) type Velocity<'a, const N: usize, L> =
+    Box<dyn Fn(&Change<N, L>) -> <L as Length<N>>::Vector + 'a>;
+
+/// A model whose runs have derivatives: every [`Model`] and every [`family::Model`], and nothing else.
+pub(crate) trait Varied<const N: usize, L: Length<N>>: Evaluate<N, L> {
+    /// The derivatives of the velocities at a node; NaN if the mass matrix is singular.
+    fn velocity_along<'a>(&'a self, node: &'a Node<N, L>) -> Velocity<'a, N, L>;
+
+    /// dp/dt at a node of a model without constraints: L_q + Q of a Lagrangian, Q − H_q of a Hamiltonian.
+    fn push(&self, node: &Node<N, L>) -> L::Vector;
+}
+
+/// The sign with which the derivative of L, or of H, by the coordinates enters dp/dt.
+fn sign(form: Form) -> f64 {
+    match form {
+        Form::Lagrangian => 1.0,
+        Form::Hamiltonian => -1.0,
+    }
+}
+
+impl<M: Model<N>, const N: usize> Varied<N, FixedLength> for M {
+    fn velocity_along<'a>(&'a self, node: &'a Node<N>) -> Velocity<'a, N, FixedLength> {
+        let Node { t, q, p, v } = node;
+        let along = Along::new(self, Place { t: *t, q, p, v });
+        Box::new(move |change| along.velocity(change))
+    }
+
+    fn push(&self, node: &Node<N>) -> [f64; N] {
+        let z = match M::FORM {
+            Form::Lagrangian => &node.v,
+            Form::Hamiltonian => &node.p,
+        };
+        let mut first = First::ZERO;
+        self.first(node.t, &node.q, z, &mut first);
+        let sign = sign(M::FORM);
+        std::array::from_fn(|a| sign * first.q[a] + first.force[a])
+    }
+}
+
+#[cfg(feature = "sparse")]
+impl<M: family::Model> Varied<0, RunTimeLength> for M {
+    fn velocity_along<'a>(
+        &'a self,
+        node: &'a Node<0, RunTimeLength>,
+    ) -> Velocity<'a, 0, RunTimeLength> {
+        let along = run_time::Along::new(self, node);
+        Box::new(move |change| along.velocity(change))
+    }
+
+    fn push(&self, node: &Node<0, RunTimeLength>) -> Vec<f64> {
+        let z = match M::FORM {
+            Form::Lagrangian => &node.v,
+            Form::Hamiltonian => &node.p,
+        };
+        let zeros = || vec![0.0; node.q.len()];
+        let (mut by_z, mut by_q, mut force) = (zeros(), zeros(), zeros());
+        let first = Gradient {
+            z: &mut by_z,
+            q: &mut by_q,
+            force: &mut force,
+        };
+        self.first(node.t, &node.q, z, first);
+        let sign = sign(M::FORM);
+        let both = by_q.iter().zip(&force);
+        // Models without forces leave `force` at zero.
+        both.map(|(by_q, force)| sign * by_q + force).collect()
+    }
+}

@@ -1,0 +1,129 @@
+//! Solves the elements of a recorded run once more, for their derivatives.
+
+use super::sensitive::carried::{END, START};
+use super::setup::Simulation;
+use super::trail::{Between, Element, LONG_STEPS, Trail};
+use crate::error::RunErrorKind;
+use crate::length::RunTimeLength;
+use tfe_runtime::family::{self, OperatorError, TransitionOperator};
+use tfe_runtime::{Direction, Parameter};
+
+/// Receives the elements of a recorded run with their derivatives, and the records between them, in the order of the
+/// run.
+pub(super) trait Retrace<'m, M> {
+    /// Processes an element with its derivatives by the parameters, followed by those by its start time, if an event
+    /// precedes it, and by its end time, if an event ends it.
+    fn element(
+        &mut self,
+        model: &M,
+        element: &Element,
+        transition: &TransitionOperator,
+    ) -> Result<(), OperatorError>;
+
+    /// Processes a record between elements; `model` has the parameters that were set before.
+    fn between(&mut self, model: &M, between: &Between<'m, M>) -> Result<(), RunErrorKind>;
+}
+
+impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
+    /// Solves the elements of a trail once more and passes them to `follower`, with the derivatives by parameters of
+    /// given indices. Errors name `call`, the method that the user has called.
+    ///
+    /// # Errors
+    /// If an element or an event has no derivative.
+    pub(super) fn retrace(
+        &self,
+        call: &'static str,
+        trail: &Trail<'m, M>,
+        parameters: &[usize],
+        follower: &mut dyn Retrace<'m, M>,
+    ) -> Result<(), RunErrorKind> {
+        let by = |&index: &usize| Direction {
+            parameter: Some(Parameter::Any(index)),
+            ..Direction::default()
+        };
+        let named: Vec<Direction> = parameters.iter().map(by).collect();
+        let directions = |element: &Element| {
+            let mut all = named.clone();
+            all.extend(element.moves.0.then_some(START));
+            all.extend(element.moves.1.then_some(END));
+            all
+        };
+        let elements = &trail.elements;
+        let mut between = trail.between.iter().peekable();
+        let mut model = self.model.clone();
+        let mut passed = 0;
+        loop {
+            while let Some((_, one)) = between.next_if(|(at, _)| *at == passed) {
+                if let Between::Set(other) = one {
+                    model = other.clone();
+                }
+                follower.between(&*model, one)?;
+            }
+            if passed == elements.len() {
+                return Ok(());
+            }
+            // The elements up to the next change of parameters, all of one model.
+            let sets = |(_, one): &&(usize, Between<'m, M>)| matches!(one, Between::Set(_));
+            let end = between
+                .clone()
+                .find(sets)
+                .map_or(elements.len(), |(at, _)| *at);
+            let mut refusal = None;
+            let steps = elements[passed..end].iter();
+            let steps = steps.map(|one| ((one.t, one.h, &one.before), directions(one)));
+            let each = |transition: TransitionOperator| {
+                let element = &elements[passed];
+                element.check(transition.end(), self.control.tolerance)?;
+                follower.element(&*model, element, &transition)?;
+                passed += 1;
+                if passed == end {
+                    return Ok(());
+                }
+                while let Some((_, one)) = between.next_if(|(at, _)| *at == passed) {
+                    if let Err(kind) = follower.between(&*model, one) {
+                        refusal = Some(kind);
+                        return Err(OperatorError::Cut);
+                    }
+                }
+                Ok(())
+            };
+            let element = self.chosen_element();
+            let found = TransitionOperator::of_steps_towards(&*model, element, 0.0, steps, each);
+            if let Err((_, error)) = found {
+                return Err(
+                    refusal.unwrap_or_else(|| operator_failed(error, elements.get(passed), call))
+                );
+            }
+        }
+    }
+}
+
+/// The error of a run one of whose elements has no derivative.
+pub(super) fn operator_failed(
+    error: OperatorError,
+    at: Option<&Element>,
+    call: &'static str,
+) -> RunErrorKind {
+    match error {
+        OperatorError::Family(error) => RunErrorKind::Family(error),
+        OperatorError::Step(source) => {
+            let (element, time, step) = at.map_or((0, f64::NAN, f64::NAN), |element| {
+                (element.number, element.t, element.h)
+            });
+            RunErrorKind::Solve {
+                element,
+                time,
+                step,
+                source,
+            }
+        }
+        OperatorError::Cut => RunErrorKind::Unsupported {
+            call,
+            of: LONG_STEPS,
+        },
+        _ => RunErrorKind::Unsupported {
+            call,
+            of: "models of run-time length",
+        },
+    }
+}

@@ -1,0 +1,350 @@
+//! The derivatives along a run of a model of either kind of length: over events, and at recorded nodes (T-124).
+
+use super::acts::Acting;
+use crate::error::RunErrorKind;
+use crate::length::Length;
+use crate::motion::{Event, Motion, Node};
+use crate::sensitivity::inside::{Before, Inside, Moved};
+use crate::sensitivity::slopes::Change;
+use crate::sensitivity::varied::Varied;
+use crate::sensitivity::{Sensitive, Slopes};
+use crate::simulation::events::Severed;
+use crate::simulation::events::value::output_slopes;
+use crate::simulation::kind::Simulated;
+use nalgebra::{DMatrix, RowDVector};
+use tfe_runtime::transition::TransitionError;
+use tfe_runtime::{CoordinateName, Direction, InsideSlopes, StepError};
+
+/// The start of the element moves in time, its end does not.
+pub(in crate::simulation) const START: Direction = Direction {
+    time: 1.0,
+    length: -1.0,
+    parameter: None,
+    damping: 0.0,
+};
+
+/// Only the end moves in time.
+pub(in crate::simulation) const END: Direction = Direction {
+    time: 0.0,
+    length: 1.0,
+    parameter: None,
+    damping: 0.0,
+};
+
+/// The derivatives at the current point of a run, and those collected so far.
+pub(in crate::simulation) struct Carried {
+    /// The indices of the parameters.
+    indices: Vec<usize>,
+    /// The derivatives at the current state.
+    pub(in crate::simulation) before: Before,
+    /// ∂(p, q)/∂(start, parameters) after the action that follows.
+    acted: Option<DMatrix<f64>>,
+    /// The error of an action that sets a parameter to a value which depends on the state.
+    dependent: Option<RunErrorKind>,
+    nodes: Vec<Slopes>,
+    /// The derivatives along the elements so far, if asked for.
+    inside: Option<Vec<Inside>>,
+    events: Vec<(usize, Vec<f64>)>,
+}
+
+/// The derivatives of the state at an event, before its action.
+pub(in crate::simulation) struct Reached {
+    /// The derivatives at fixed time, by the start and by parameters.
+    pub(in crate::simulation) at: DMatrix<f64>,
+    /// The time derivative ẏ, one column.
+    pub(in crate::simulation) rate: DMatrix<f64>,
+}
+
+/// The derivatives along an element.
+pub(in crate::simulation) struct Along {
+    /// The times of its start and its end.
+    pub(in crate::simulation) times: (f64, f64),
+    pub(in crate::simulation) pieces: Vec<AlongPiece>,
+    /// The derivatives at the start of the element, with which those of the pieces are multiplied.
+    pub(in crate::simulation) before: Before,
+}
+
+/// The derivatives along a piece of an element; the element is the only piece if it was not cut.
+pub(in crate::simulation) struct AlongPiece {
+    pub(in crate::simulation) times: (f64, f64),
+    pub(in crate::simulation) length: f64,
+    pub(in crate::simulation) slopes: InsideSlopes,
+    /// The Legendre coefficients of dq/dτ, a row with a number for each coordinate, followed by those of dp/dτ.
+    pub(in crate::simulation) values: Vec<f64>,
+}
+
+impl Carried {
+    /// The derivatives at the start of a run, by the start and by parameters of given indices.
+    pub(in crate::simulation) fn new(coordinates: usize, indices: &[usize]) -> Self {
+        let size = 2 * coordinates;
+        Self {
+            indices: indices.to_vec(),
+            before: Before {
+                state: DMatrix::identity(size, size + indices.len()),
+                start: None,
+            },
+            acted: None,
+            dependent: None,
+            nodes: Vec::new(),
+            inside: None,
+            events: Vec::new(),
+        }
+    }
+
+    /// Also keeps the derivatives along elements.
+    pub(in crate::simulation) fn with_inside(self) -> Self {
+        Self {
+            inside: Some(Vec::new()),
+            ..self
+        }
+    }
+
+    pub(in crate::simulation) fn keeps_inside(&self) -> bool {
+        self.inside.is_some()
+    }
+
+    /// Returns the derivatives since the start or the last call, and counts them anew from here.
+    pub(in crate::simulation) fn restart(&mut self) -> DMatrix<f64> {
+        let (size, columns) = self.before.state.shape();
+        self.before.start = None;
+        std::mem::replace(&mut self.before.state, DMatrix::identity(size, columns))
+    }
+
+    pub(in crate::simulation) fn columns(&self) -> usize {
+        self.before.state.ncols()
+    }
+
+    /// The index of the parameter of a column; `None` for a column of the start.
+    fn parameter(&self, column: usize) -> Option<usize> {
+        let size = self.before.state.nrows();
+        self.indices.get(column.checked_sub(size)?).copied()
+    }
+
+    /// The derivative of the time of the current point by the quantity of a column; zero unless an event is there.
+    fn moved(&self, column: usize) -> f64 {
+        let moved = self.before.start.as_ref();
+        moved.map_or(0.0, |moved| moved[column])
+    }
+
+    pub(in crate::simulation) fn into_sensitive<const N: usize, L: Length<N>>(
+        self,
+        motion: Motion<N, L>,
+        name: impl Fn(usize) -> CoordinateName,
+    ) -> Sensitive<N, L> {
+        let names = self.indices.iter();
+        let names = names.map(|index| name(*index).to_string());
+        let inside = self.inside.unwrap_or_default();
+        Sensitive::new(motion, names.collect(), self.nodes, self.events).with_inside(inside)
+    }
+
+    /// The derivatives at an event at the start of an element, before its action.
+    pub(in crate::simulation) fn at_start<M, L, const N: usize>(
+        &self,
+        model: &M,
+        event: &Event<N, L>,
+    ) -> Reached
+    where
+        M: Varied<N, L>,
+        L: Length<N>,
+    {
+        let node = Node::of(event.t, &event.state(), event.v.clone());
+        let push = model.push(&node);
+        let both = push.as_ref().iter().chain(event.v.as_ref());
+        let rate = DMatrix::from_iterator(self.before.state.nrows(), 1, both.copied());
+        let mut at = self.before.state.clone();
+        if let Some(moved) = &self.before.start {
+            // A later start shortens the time to the fixed end.
+            for (mut column, dt) in at.column_iter_mut().zip(moved) {
+                column.axpy(-dt, &rate.column(0), 1.0);
+            }
+        }
+        Reached { at, rate }
+    }
+
+    /// The derivative of the time of an event by each column, from g(t*, y(t*)) = 0: ġ dt* = −δg. If g has jumped over
+    /// zero at the start of an element, by an impulse or an action, the time is that of the start.
+    pub(in crate::simulation) fn times<M, L, const N: usize>(
+        &self,
+        model: &M,
+        severed: &Severed<'_, '_, N, L>,
+        velocity: &dyn Fn(&Change<N, L>) -> L::Vector,
+        Reached { at, rate }: &Reached,
+    ) -> Result<Vec<f64>, TransitionError>
+    where
+        M: Simulated<N, L>,
+        L: Length<N>,
+    {
+        /// The least distance of g from zero after a jump, relative to its change in a step.
+        const JUMPED: f64 = 1e-6;
+
+        let event = severed.event;
+        let value = &severed.watched.value;
+        let slope = |change: &Change<N, L>| value.slope(model, event, change, &velocity(change));
+        let by_time = slope(&Change {
+            t: 1.0,
+            ..Change::of_column(&event.q, rate, 0)
+        });
+        let left = value.at(model, event);
+        if !severed.inside && left.abs() > JUMPED * (severed.step * by_time).abs() {
+            let still = || vec![0.0; self.columns()];
+            return Ok(self.before.start.clone().unwrap_or_else(still));
+        }
+        let time = |column| {
+            let change = Change {
+                parameter: self.parameter(column),
+                ..Change::of_column(&event.q, at, column)
+            };
+            -slope(&change) / by_time
+        };
+        let times: Vec<f64> = (0..self.columns()).map(time).collect();
+        if times.iter().all(|dt| dt.is_finite()) {
+            Ok(times)
+        } else {
+            Err(StepError::NonFinite.into())
+        }
+    }
+
+    /// Keeps the derivatives along an element; `ends` are the derivatives of its end time, if an event ends it.
+    pub(in crate::simulation) fn keep(&mut self, along: Along, ends: Option<&[f64]>) {
+        let Some(mut inside) = self.inside.take() else {
+            return;
+        };
+        let Along {
+            times: (start, end),
+            pieces,
+            before,
+        } = along;
+        for piece in pieces {
+            let times = piece.times;
+            let moved = (self.before.start.is_some() || ends.is_some()).then(|| {
+                let still = vec![0.0; self.columns()];
+                let starts = self.before.start.as_ref().unwrap_or(&still);
+                let starts = RowDVector::from_row_slice(starts);
+                let ends = RowDVector::from_row_slice(ends.unwrap_or(&still));
+                let at = |t: f64| {
+                    let part = (t - start) / (end - start);
+                    &starts * (1.0 - part) + &ends * part
+                };
+                Moved {
+                    ends: [at(times.0), at(times.1)],
+                    values: piece.values,
+                }
+            });
+            inside.push(Inside {
+                times,
+                length: piece.length,
+                slopes: piece.slopes,
+                before: before.clone(),
+                ends: ends.map(<[f64]>::to_vec),
+                moved,
+            });
+        }
+        self.inside = Some(inside);
+    }
+
+    /// Continues from the end of an element that no event has cut, with the derivatives there.
+    pub(in crate::simulation) fn passed(&mut self, end: DMatrix<f64>) {
+        (self.before.state, self.before.start) = (end, None);
+    }
+
+    /// Continues from an event that cuts an element, and keeps the derivatives along the part before it, if given.
+    pub(in crate::simulation) fn cut<M, L, const N: usize>(
+        &mut self,
+        model: &M,
+        severed: &Severed<'_, '_, N, L>,
+        mut reached: Reached,
+        along: Option<Along>,
+    ) -> Result<(), TransitionError>
+    where
+        M: Simulated<N, L> + Varied<N, L>,
+        L: Length<N>,
+    {
+        let event = severed.event;
+        let node = Node::of(event.t, &event.state(), event.v.clone());
+        let velocity = model.velocity_along(&node);
+        let times = self.times(model, severed, &*velocity, &reached)?;
+        if let Some(along) = along {
+            self.keep(along, Some(&times));
+        }
+        let Reached { at, rate } = &mut reached;
+        for (mut column, dt) in at.column_iter_mut().zip(&times) {
+            column.axpy(*dt, &rate.column(0), 1.0);
+        }
+        (self.acted, self.dependent) = (None, None);
+        if severed.goes_on {
+            let acting = Acting {
+                model,
+                velocity: &*velocity,
+                severed,
+                at,
+                rate,
+                times: &times,
+            };
+            self.acted = Some(acting.after(|column| self.parameter(column))?);
+            // If derivatives by parameters are asked for, actions that set parameters are refused.
+            if self.indices.is_empty() {
+                self.dependent = acting.dependent();
+            }
+        }
+        self.before.state = reached.at;
+        self.events.push((severed.number, times.clone()));
+        self.before.start = Some(times);
+        Ok(())
+    }
+
+    /// Continues after the action at that event.
+    pub(in crate::simulation) fn acted(&mut self) {
+        if let Some(acted) = self.acted.take() {
+            self.before.state = acted;
+        }
+    }
+
+    /// Parameters were set at that event.
+    ///
+    /// # Errors
+    /// If derivatives by parameters are asked for, and if a value that was set depends on the state.
+    pub(in crate::simulation) fn set(&mut self) -> Result<(), RunErrorKind> {
+        if !self.indices.is_empty() {
+            let call = "run_sensitive";
+            return Err(RunErrorKind::SetUnsupported { call });
+        }
+        self.dependent.take().map_or(Ok(()), Err)
+    }
+
+    /// Keeps the derivatives at a recorded node.
+    pub(in crate::simulation) fn recorded<M, L, const N: usize>(
+        &mut self,
+        model: &M,
+        node: &Node<N, L>,
+    ) where
+        M: Simulated<N, L> + Varied<N, L>,
+        L: Length<N>,
+    {
+        let velocity_along = model.velocity_along(node);
+        let columns = self.columns();
+        let mut slopes = Slopes {
+            state: self.before.state.clone(),
+            velocity: DMatrix::zeros(self.before.state.nrows() / 2, columns),
+            outputs: DMatrix::zeros(model.output_count(), columns),
+        };
+        for column in 0..columns {
+            let change = Change {
+                // The time of an event moves, too.
+                t: self.moved(column),
+                parameter: self.parameter(column),
+                ..Change::of_column(&node.q, &self.before.state, column)
+            };
+            let velocity = velocity_along(&change);
+            slopes
+                .velocity
+                .column_mut(column)
+                .copy_from_slice(velocity.as_ref());
+            if slopes.outputs.nrows() > 0 {
+                let place = (node.t, &node.q, &node.p, &node.v);
+                let outputs = output_slopes(model, place, &change, &velocity);
+                slopes.outputs.column_mut(column).copy_from_slice(&outputs);
+            }
+        }
+        self.nodes.push(slopes);
+    }
+}
