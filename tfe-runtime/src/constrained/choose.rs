@@ -7,11 +7,13 @@ use crate::model::{Constraint, First, Form, Model};
 /// Below it what a dependent row has of its own is rounding.
 const NOISE: f64 = 1e-13;
 
-/// What a row has of its own in units of inertia, relative to the row, where it is told to be independent against what its length says.
+/// A row left out counts as independent after all if its orthogonal part in units of inertia is larger than this,
+/// relative to the row.
 const CLEAR: f64 = 1e-6;
 
-/// As [`Rows::choose`], which takes all coordinates as they are: beside angles the lengths of 1e-11 m in `x - r*cos(a)` and `x - l*cos(b)` are so small that both rows seem to be the same. Where rows were left
-/// out that have more of their own than roundings, coordinates are measured in the square roots of their inertias.
+/// As [`Rows::choose`], but independent of units. Beside angles, the lengths of 1e-11 m in `x - r*cos(a)` and
+/// `x - l*cos(b)` are so small that both rows seem to be equal. So if rows were left out whose orthogonal parts are more
+/// than rounding errors, coordinates are measured in the square roots of their inertias.
 pub(crate) fn choose<M, const N: usize>(
     rows: &mut Rows<'_, N>,
     model: &M,

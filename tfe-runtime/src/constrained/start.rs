@@ -1,4 +1,4 @@
-//! How far a start is from constraints, beside what each of them is made of.
+//! The violation of constraints by a start, relative to the size of the terms of each constraint.
 
 use super::residual::over;
 use super::rows::{Constrains, Rows, norm, rows_len};
@@ -9,19 +9,22 @@ use crate::model::Model;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// By how much each number of a good start may be rounded: what an iteration takes for roundings of positions leaves no more.
+/// The relative rounding error that each number of a consistent start may have: iterations accept increments of
+/// positions of this size as rounding errors.
 const ROUNDINGS: f64 = crate::control::POSITION_ROUND_OFF;
 
-/// As [`residuals`](super::residuals), for a start: a holonomic constraint is measured also beside what it is made of itself, and the larger part counts (T-165).
+/// As [`residuals`](super::residuals), for a start: the violation of a holonomic constraint is also compared with the
+/// size of its own terms, and the larger relative violation counts (T-165).
 ///
-/// Beside x = 1.5e11 m a unit quaternion, or a rod of one metre, holds with any error as far as the extent of the positions tells. With the gradient A, the second derivatives
-/// φ_qq and the terms of φ, which bounds of its formula tell,
+/// Relative to the extent of all positions, a unit quaternion or a rod of one metre beside x = 1.5e11 m would be accepted
+/// with any error. With the gradient A, the second derivatives φ_qq, and the size of the terms of φ from an enclosure of
+/// its formula, the scales are
 ///
 /// ```text
-/// |φ| beside S = Σ_j |A_j| min(|q|, |A| / |φ_qq,j|) + terms ,     |A v + a| beside max(|A| |v| + |a|, S/h) ,
+/// S = Σ_j |A_j| min(|q|, |A| / |φ_qq,j|) + terms   for |φ| ,     max(|A| |v| + |a|, S/h)   for |A v + a| ,
 /// ```
 ///
-/// where v has the coordinates of this constraint only, and what roundings of the start make is taken off.
+/// where v has only the coordinates of this constraint. The effect of rounding errors of the start is subtracted first.
 #[must_use]
 pub fn start_residuals<M, const N: usize>(
     model: &M,
@@ -54,10 +57,11 @@ fn beside_own<const N: usize>(
         if !declared[c].kind.is_holonomic() {
             continue;
         }
-        // A sum whose bounds are so far apart has terms of that size; without bounds nothing is known of them, and nothing is refused.
+        // The enclosure of a sum is wider than its value by the rounding errors of its terms. An infinite one says nothing
+        // of them, and nothing is refused.
         let terms = (bounds[c].high() - bounds[c].low()) / f64::EPSILON;
         let (position, velocity) = of_row(&mut rows, model, c, (t, h), (q, v), terms);
-        // What is no number stays so.
+        // NaN stays NaN.
         if position > residual.relative_position {
             residual.relative_position = position;
         }
@@ -68,7 +72,8 @@ fn beside_own<const N: usize>(
     residuals
 }
 
-/// |φ| and |A v + a| of one constraint, beside what it is made of; zeros where they are small beside its terms alone.
+/// |φ| and |A v + a| of one constraint, relative to the size of its terms; zeros if they are small relative to these
+/// terms alone.
 fn of_row<const N: usize>(
     rows: &mut Rows<'_, N>,
     model: &dyn Constrains<N>,
@@ -99,7 +104,8 @@ fn of_row<const N: usize>(
     let (mut size, mut own) = (terms, [0.0; N]);
     for a in 0..N {
         let bent = norm(&curvature[a]);
-        // Infinite, or no number, where the coordinate is in no product: it counts as far as all positions reach.
+        // The quotient is infinite or NaN if the coordinate appears only linearly: it counts as far as all positions
+        // reach.
         size += row[a].abs() * (length / bent).min(extent);
         if row[a] != 0.0 || bent != 0.0 {
             own[a] = v[a];

@@ -1,4 +1,4 @@
-//! How far a start is from constraints, beside what each of them is made of (T-165).
+//! The violation of constraints by a start, relative to the size of the terms of each constraint (T-165).
 
 use super::model::Model;
 use super::pattern::Pattern;
@@ -9,13 +9,14 @@ use crate::legendre::largest;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The first constraint that a position violates by more than a start may, beside what this constraint is made of, with the part of it; nothing where all hold. The rows have been evaluated there.
+/// The first constraint that a position violates by more than a start may, relative to the size of its terms, with this
+/// relative violation; `None` if all hold. The rows have been evaluated at that position.
 ///
 /// ```text
-/// |φ| beside S = Σ_j |A_j| min(max |q|, |A| / |φ_qq,j|) + terms
+/// S = Σ_j |A_j| min(max |q|, |A| / |φ_qq,j|) + terms   is the scale for |φ|
 /// ```
 ///
-/// Distances below `least` are what iterations were allowed to leave.
+/// Distances below `least` are accepted: the tolerance of the iterations of the run allows them.
 pub(super) fn violated<M: Model>(
     model: &M,
     (t, q): (f64, &[f64]),
@@ -34,7 +35,7 @@ pub(super) fn violated<M: Model>(
     let mut curvature: Option<Curvature> = None;
     for (row, bounds) in bounds.iter().enumerate() {
         let length = lengths[row];
-        // Without bounds nothing is known of the terms.
+        // An infinite enclosure says nothing of the terms.
         let terms = (bounds.high() - bounds.low()) / f64::EPSILON;
         let rounded = POSITION_ROUND_OFF * (sums[row] + (rows.drift[row] * t).abs());
         let phi = rows.phi[row].abs() - rounded;
@@ -46,7 +47,7 @@ pub(super) fn violated<M: Model>(
         curvature.evaluate(model, (t, q), row);
         let own = rows.places().zip(&rows.values);
         let own = own.filter(|((constraint, _), _)| *constraint == row);
-        // A coordinate that is in no product counts as far as all positions reach.
+        // A coordinate that appears only linearly counts as far as all positions reach.
         let reaches =
             own.map(|((_, a), value)| value.abs() * (length / curvature.sizes[a]).min(extent));
         let part = phi / (terms + reaches.sum::<f64>());
