@@ -1,0 +1,204 @@
+//! Motions as they are recorded: from their start, node by node.
+
+use super::arcs::Arcs;
+use super::{Checkpoint, Event, Motion, Node, Outputs, Setting, Warning};
+use crate::constraints::{ConstraintResidual, Reactions};
+use crate::evaluate::Evaluate;
+use crate::length::Length;
+use crate::numbers::larger;
+use tfe_runtime::{CoordinateName, Statistics};
+
+impl<const N: usize, L: Length<N>> Motion<N, L> {
+    /// A motion that consists of its start.
+    pub(crate) fn from_start<M>(model: &M, t: f64, start: &L::State) -> Self
+    where
+        M: Evaluate<N, L>,
+    {
+        let (_, p) = L::parts(start);
+        let node = Node::new(model, t, start, &L::zero(p));
+        Self::starting(model, node)
+    }
+
+    /// The same for a start whose velocity is known.
+    pub(crate) fn starting<M: Evaluate<N, L>>(model: &M, node: Node<N, L>) -> Self {
+        let mut motion = Self::empty(model);
+        motion.record_node(model, node);
+        motion
+    }
+
+    /// The same for a start whose reactions are known as well.
+    pub(crate) fn starting_with<M>(model: &M, node: Node<N, L>, reactions: Vec<f64>) -> Self
+    where
+        M: Evaluate<N, L>,
+    {
+        let mut motion = Self::empty(model);
+        motion.record_all(model, node, reactions);
+        motion
+    }
+
+    /// The same for a model that cannot be evaluated at the start.
+    pub(crate) fn unknown<M: Evaluate<N, L>>(model: &M, t: f64, start: &L::State) -> Self {
+        let mut motion = Self::empty(model);
+        let (_, p) = L::parts(start);
+        let v = L::unknown(p);
+        motion.nodes.push(Node::of(t, start, v.clone()));
+        motion.velocities.push(v);
+        motion.energies.push(f64::NAN);
+        motion.outputs.values = vec![f64::NAN; motion.outputs.names.len()];
+        motion.reactions.values = vec![f64::NAN; motion.reactions.names.len()];
+        motion
+    }
+
+    /// The start of a run that never began. The model is not evaluated, since its lengths may be inconsistent.
+    pub(crate) fn unasked(t: f64, start: &L::State) -> Self {
+        let (_, p) = L::parts(start);
+        let nodes = vec![Node::of(t, start, L::unknown(p))];
+        Self {
+            nodes,
+            ..Self::without_nodes(Vec::new(), Vec::new(), Vec::new())
+        }
+    }
+
+    fn empty<M: Evaluate<N, L>>(model: &M) -> Self {
+        Self::without_nodes(
+            model.coordinate_names(),
+            model.output_names(),
+            model.constraint_names(),
+        )
+    }
+
+    fn without_nodes(
+        names: Vec<CoordinateName>,
+        outputs: Vec<CoordinateName>,
+        constraints: Vec<L::ConstraintName>,
+    ) -> Self {
+        Self {
+            nodes: Vec::new(),
+            velocities: Vec::new(),
+            energies: Vec::new(),
+            outputs: Outputs {
+                names: outputs,
+                values: Vec::new(),
+            },
+            residual: ConstraintResidual {
+                position: 0.0,
+                velocity: 0.0,
+                rank: constraints.len(),
+            },
+            reactions: Reactions {
+                names: constraints,
+                values: Vec::new(),
+            },
+            elements: Vec::new(),
+            statistics: Statistics::default(),
+            warnings: Vec::new(),
+            names,
+            checkpoint: None,
+            is_stopped: false,
+            events: Vec::new(),
+            arcs: Arcs::default(),
+        }
+    }
+
+    /// Appends a node with its velocity, energy and outputs. These are NaN if the Legendre transform has no solution
+    /// (singular mass matrix); the state itself is still valid.
+    pub(crate) fn record<M: Evaluate<N, L>>(&mut self, model: &M, t: f64, state: &L::State) {
+        let zero;
+        let guess = match self.velocities.last() {
+            Some(guess) => guess,
+            None => {
+                let (_, p) = L::parts(state);
+                zero = L::zero(p);
+                &zero
+            }
+        };
+        self.record_node(model, Node::new(model, t, state, guess));
+    }
+
+    /// The same if the velocity is known.
+    #[inline(always)]
+    pub(crate) fn record_node<M: Evaluate<N, L>>(&mut self, model: &M, node: Node<N, L>) {
+        let reactions = match M::IS_CONSTRAINED {
+            true => model.reactions(node.t, (&node.q, &node.p), &node.v),
+            false => Vec::new(),
+        };
+        self.record_all(model, node, reactions);
+    }
+
+    /// The same if the reactions are known as well.
+    #[inline(always)]
+    pub(crate) fn record_all<M>(&mut self, model: &M, node: Node<N, L>, reactions: Vec<f64>)
+    where
+        M: Evaluate<N, L>,
+    {
+        let place = self.nodes.len();
+        self.nodes.push(node);
+        let node = &self.nodes[place];
+        let (t, at) = (node.t, (&node.q, &node.p));
+        self.energies.push(model.energy(t, at, &node.v));
+        let columns = self.outputs.names.len();
+        if columns > 0 {
+            let start = self.outputs.values.len();
+            self.outputs.values.resize(start + columns, 0.0);
+            let values = &mut self.outputs.values[start..];
+            model.outputs(t, at, &node.v, values);
+        }
+        if M::IS_CONSTRAINED {
+            let residual = model.residual(t, &node.q, &node.v);
+            let largest = &mut self.residual;
+            largest.position = larger(largest.position, residual.position);
+            largest.velocity = larger(largest.velocity, residual.velocity);
+            largest.rank = largest.rank.min(residual.rank);
+            self.reactions.values.extend(reactions);
+        }
+        self.velocities.push(node.v.clone());
+    }
+
+    pub(crate) fn add_warning(&mut self, warning: Warning) {
+        self.warnings.push(warning);
+    }
+
+    pub(crate) fn set_checkpoint(&mut self, checkpoint: Checkpoint<N, L>) {
+        self.checkpoint = Some(Box::new(checkpoint));
+    }
+
+    /// Records that an event has ended the run.
+    pub(crate) fn set_stopped(&mut self) {
+        self.is_stopped = true;
+    }
+
+    pub(crate) fn keep_element(&mut self, element: L::Polynomial) {
+        self.elements.push(element);
+    }
+
+    pub(crate) fn set_statistics(&mut self, statistics: Statistics) {
+        self.statistics = statistics;
+    }
+
+    pub(crate) fn set_warnings(&mut self, warnings: Vec<Warning>) {
+        self.warnings = warnings;
+    }
+
+    pub(crate) fn set_events(&mut self, events: Vec<Event<N, L>>) {
+        self.events = events;
+    }
+
+    /// Begins a new arc at the last node.
+    pub(crate) fn begin_arc(&mut self, so_far: Statistics) {
+        self.arcs.begin(self.nodes.len() - 1, so_far);
+    }
+
+    /// Records that parameters, given by their indices, are set at the next node, which has the time of the last one.
+    pub(crate) fn set_parameters(&mut self, names: &[CoordinateName], values: &[(usize, f64)]) {
+        let (t, node) = (self.last().t, self.nodes.len());
+        for (number, value) in values {
+            let parameter = names.get(*number).map(ToString::to_string);
+            self.arcs.set(Setting {
+                t,
+                node,
+                parameter: parameter.unwrap_or_default(),
+                value: *value,
+            });
+        }
+    }
+}
