@@ -11,5 +11,7 @@ mod products;
 pub(crate) mod quad;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 mod quads;
+#[cfg(all(feature = "simd", target_arch = "x86_64"))]
+mod register;
 pub(crate) mod side;
 pub(crate) mod storage;

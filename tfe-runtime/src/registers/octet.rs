@@ -6,7 +6,7 @@ use crate::trigonometry::LIMIT;
 use pulp::x86::V4;
 use pulp::{Simd, b8, f64x8, u64x8};
 
-crate::registers::quad::register! {
+crate::registers::register::register! {
     /// Eight numbers, and the proof that the processor has registers for them.
     Octet: 8 of V4,
     f64x8, b8, u64x8, mul_sub_f64x8, mul_add_f64x8, shl_const_u64x8, shr_const_u64x8
