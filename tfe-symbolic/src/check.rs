@@ -3,30 +3,27 @@
 //! There is one small function for each rule. Formulas are not examined here, but in [`lower`](crate::lower). May
 //! import `expr`, `vocabulary`, `diagnostic`, `syntax` and `model`.
 
+mod arrays;
+mod results;
 mod solver;
 mod transformation;
 mod variants;
+mod words;
 
-use crate::diagnostic::{Bag, Kind, Role, Span, nearest};
+pub use arrays::{MAX_COORDINATES, Slots};
+pub(crate) use words::{reserved, unusable_type_name};
+
+use crate::diagnostic::{Bag, Kind, Role, Span};
 use crate::expr::input::{Affine, IndexSymbol};
 use crate::expr::ordered::SortedMap;
 use crate::model::declared::{Form, Solver};
-use crate::syntax::ast::{Array, Expr, ExprKind, Item, Name, Pass, Range, Spanned};
+use crate::syntax::ast::{Expr, Item, Name, Pass, Range, Spanned};
 use crate::syntax::context::{Context, FieldKind, Length};
-use crate::vocabulary::{Argument, is_function};
-
-/// The largest number of coordinates in literal arrays: beyond it, tables of the engine become too large.
-pub const MAX_COORDINATES: usize = 10_000;
+use crate::vocabulary::Argument;
+use arrays::{listed, slots};
 
 /// The largest number of inputs that a model can have.
 pub const MAX_INPUTS: usize = 16;
-
-/// The methods that the macro gives every model; outputs become further methods.
-const METHODS: &[&str] = &["state", "structure"];
-/// The functions that the macro gives models made from another model.
-const VARIANT_METHODS: &[&str] = &["of", "of_state"];
-/// A further function, for models with a time transformation.
-const CLOCK_METHOD: &str = "state_at";
 
 /// What a name in a formula stands for.
 #[derive(Clone, Debug, PartialEq)]
@@ -56,24 +53,6 @@ impl Symbol {
             Self::Field(_) => Role::Field,
             Self::ConstParameter => Role::ConstParameter,
         }
-    }
-}
-
-/// A coordinate or momentum (array) as declared.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Slots {
-    /// The name.
-    pub name: Name,
-    /// The flat index of its first element: affine in the lengths of the arrays before it.
-    pub first: Affine,
-    /// The length of an array.
-    pub length: Option<Affine>,
-}
-
-impl Slots {
-    /// Whether a mistake in the length has been reported.
-    pub(crate) fn has_wrong_length(&self) -> bool {
-        self.length == Some(unknown_length(&self.name.node))
     }
 }
 
@@ -226,148 +205,6 @@ pub fn model(arguments: Arguments, context: &Context, bag: &mut Bag) -> Model {
         (Some((Form::Lagrangian, _)), None) => {}
     }
     model
-}
-
-/// Assigns to each array its place in the flat vector.
-fn slots(arrays: Vec<Array>, context: &Context, bag: &mut Bag) -> Vec<Slots> {
-    let mut first = Affine::default();
-    let mut slots = Vec::new();
-    for Array { name, length } in arrays {
-        let length = length.map(|length| array_length(&name, &length, context, bag));
-        let size = match &length {
-            None => 1,
-            Some(length) => length
-                .as_constant()
-                .and_then(|n| usize::try_from(n).ok())
-                .unwrap_or(0),
-        };
-        let before = usize::try_from(first.constant).unwrap_or(usize::MAX);
-        if size > MAX_COORDINATES || before.saturating_add(size) > MAX_COORDINATES {
-            bag.push(
-                name.span,
-                Kind::TooManyCoordinates {
-                    limit: MAX_COORDINATES,
-                },
-            );
-            // Small enough for all later steps, and of unknown length, so that no further messages follow.
-            slots.push(Slots {
-                length: Some(unknown_length(&name.node)),
-                name,
-                first: first.clone(),
-            });
-            continue;
-        }
-        let next = first.plus_scaled(length.as_ref().unwrap_or(&Affine::constant(1)), 1);
-        slots.push(Slots {
-            name,
-            first: first.clone(),
-            length,
-        });
-        first = next.unwrap_or(first);
-    }
-    slots
-}
-
-/// A length that is never compared with anything, for use after a mistake in the true one.
-fn unknown_length(name: &str) -> Affine {
-    Affine::symbol(IndexSymbol::Field(format!("length of {name}")))
-}
-
-fn array_length(name: &Name, length: &Expr, context: &Context, bag: &mut Bag) -> Affine {
-    match &length.node {
-        ExprKind::Number(text) => match text.replace('_', "").parse::<i64>() {
-            Ok(0) => {
-                bag.push(
-                    length.span,
-                    Kind::ZeroLength {
-                        name: name.node.clone(),
-                        field: false,
-                    },
-                );
-            }
-            Ok(size) => return Affine::constant(size),
-            Err(_)
-                if text
-                    .bytes()
-                    .all(|byte| byte.is_ascii_digit() || byte == b'_') =>
-            {
-                bag.push(
-                    length.span,
-                    Kind::NumberTooLarge {
-                        number: text.clone(),
-                    },
-                );
-            }
-            Err(_) => bag.push(length.span, Kind::LengthNotSimple),
-        },
-        ExprKind::Name(symbol) if context.const_parameters.contains(symbol) => {
-            return Affine::symbol(IndexSymbol::ConstParameter(symbol.clone()));
-        }
-        ExprKind::Name(symbol) => match context.field(symbol).map(|field| &field.kind) {
-            Some(FieldKind::Length) => {
-                return Affine::symbol(IndexSymbol::Field(symbol.clone()));
-            }
-            Some(_) => bag.push(length.span, Kind::LengthNotSimple),
-            None => {
-                let fields = context.fields.iter();
-                let fields = fields.filter(|field| field.kind == FieldKind::Length);
-                let parameters = context.const_parameters.iter().map(String::as_str);
-                let lengths = parameters.chain(fields.map(|field| field.name.as_str()));
-                let nearest = nearest(symbol, lengths);
-                bag.push(
-                    length.span,
-                    Kind::UnknownLength {
-                        name: symbol.clone(),
-                        nearest,
-                    },
-                );
-            }
-        },
-        _ => bag.push(length.span, Kind::LengthNotSimple),
-    }
-    unknown_length(&name.node)
-}
-
-/// The keywords of Rust that cannot be written as raw identifiers, and therefore cannot be names in generated code.
-const KEYWORDS_WITHOUT_RAW_FORM: &[&str] = &["crate", "self", "super", "Self"];
-
-/// Whether Rust refuses the name even in its raw form.
-fn keyword(name: &str) -> Option<Kind> {
-    KEYWORDS_WITHOUT_RAW_FORM
-        .contains(&name)
-        .then(|| Kind::Keyword {
-            name: name.to_owned(),
-        })
-}
-
-/// Checks the name of a struct that will be generated: formulas do not see it.
-pub(crate) fn unusable_type_name(name: &str) -> Option<Kind> {
-    match name {
-        "_" => Some(Kind::Keyword {
-            name: name.to_owned(),
-        }),
-        name => keyword(name),
-    }
-}
-
-/// Checks a new name against the reserved words of the language.
-pub(crate) fn reserved(name: &str, field: bool) -> Option<Kind> {
-    if let Some(kind) = keyword(name) {
-        return Some(kind);
-    }
-    if name.starts_with("__tfe") {
-        Some(Kind::ReservedPrefix {
-            name: name.to_owned(),
-            field,
-        })
-    } else if matches!(name, "t" | "pi" | "_") || is_function(name) {
-        Some(Kind::ReservedName {
-            name: name.to_owned(),
-            field,
-        })
-    } else {
-        None
-    }
 }
 
 impl Model {
@@ -529,74 +366,4 @@ impl Model {
             );
         }
     }
-
-    fn outputs(&self, bag: &mut Bag) {
-        let mut names: Vec<&str> = Vec::new();
-        for (Spanned { node: name, span }, range, _) in &self.outputs {
-            if let Some(range) = range
-                && !self.dof.is_of_run_time()
-            {
-                bag.push(range.variable.span.join(range.end.span), Kind::OutputFamily);
-            }
-            if let Some(kind) = reserved(name, false).or_else(|| self.clock_momentum(name)) {
-                bag.push(*span, kind);
-            }
-            // An output may have the name of the `let` that it shows; a coordinate or momentum has its column in the
-            // results already.
-            let taken = match self.symbols.get(name) {
-                Some(symbol @ (Symbol::Coordinate(_) | Symbol::Momentum(_))) => Some(symbol.role()),
-                _ if self.is_method(name) => Some(Role::Method),
-                _ => names.contains(&name.as_str()).then_some(Role::Output),
-            };
-            if let Some(taken) = taken {
-                bag.push(
-                    *span,
-                    Kind::NameClash {
-                        name: name.clone(),
-                        taken,
-                    },
-                );
-            }
-            names.push(name);
-        }
-    }
-
-    /// Whether the macro gives the model a method of this name.
-    fn is_method(&self, name: &str) -> bool {
-        METHODS.contains(&name)
-            || (self.time_transformation.is_some() && name == CLOCK_METHOD)
-            || (!self.variants.is_empty() && VARIANT_METHODS.contains(&name))
-    }
-
-    /// Checks the names of constraints, which do not appear in formulas, but in results beside outputs.
-    fn constraint_names(&self, bag: &mut Bag) {
-        let mut names: Vec<&str> = Vec::new();
-        for (Spanned { node: name, span }, ..) in &self.constraints {
-            let taken = if names.contains(&name.as_str()) {
-                Some(Role::Constraint)
-            } else {
-                let mut outputs = self.outputs.iter();
-                let output = outputs.any(|(output, ..)| output.node == *name);
-                output.then_some(Role::Output)
-            };
-            if let Some(taken) = taken {
-                let name = name.clone();
-                bag.push(*span, Kind::NameClash { name, taken });
-            } else if let Some(kind) = unusable_type_name(name) {
-                bag.push(*span, kind);
-            }
-            names.push(name);
-        }
-    }
-}
-
-fn listed(slots: &[Slots]) -> String {
-    let names: Vec<String> = slots
-        .iter()
-        .map(|slots| match &slots.length {
-            Some(length) => format!("{}[{length}]", slots.name),
-            None => slots.name.node.clone(),
-        })
-        .collect();
-    names.join(", ")
 }
