@@ -7,7 +7,7 @@
 //! cargo bench --bench record -- ensemble                 # cases whose names contain a word
 //! ```
 
-#[path = "../tests/record/cases.rs"]
+#[path = "../tests/record/cases/mod.rs"]
 mod cases;
 
 use cases::Case;
