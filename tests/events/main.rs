@@ -7,6 +7,7 @@ mod derivatives;
 mod largest;
 mod meeting;
 mod near;
+mod parts;
 #[path = "../../examples/events_beside_scans.rs"]
 mod scans;
 mod setting;
