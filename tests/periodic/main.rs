@@ -1,6 +1,7 @@
 //! Periodic orbits, their multipliers, and boundary-value problems against reference values and closed forms.
 
 mod boundary;
+mod branch_ends;
 mod branches;
 #[path = "../common/mod.rs"]
 mod common;
