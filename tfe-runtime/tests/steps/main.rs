@@ -1,12 +1,13 @@
 //! Steps on nonlinear models: orders, equivalences, structure, solvers, failures.
 
+#[path = "../common/mod.rs"]
 mod common;
+mod failures;
+mod solvers;
 
 use common::*;
 use tfe_runtime::step::{Control, Impulse, Stepper};
-use tfe_runtime::{
-    Element, LegendreError, Model, Rule, Solve, State, StepError, legendre, transition,
-};
+use tfe_runtime::{Element, Model, Solve, State, legendre, transition};
 
 fn families(nodes: usize) -> [Element; 6] {
     [
@@ -230,126 +231,6 @@ fn energy_is_kept_by_the_element_named_after_it() {
 }
 
 #[test]
-fn the_solvers_agree_and_count() {
-    let (model, start) = duffing();
-    for element in families(4) {
-        let end = |solve| {
-            let control = Control {
-                solve,
-                ..Control::default()
-            };
-            run_with(&model, element, control, start, 0.1, 30)
-        };
-        let (auto, statistics) = end(Solve::Auto);
-        let (fixed, _) = end(Solve::FixedPoint);
-        let (newton, newton_statistics) = end(Solve::Newton);
-        // Thirty steps of a few roundings each.
-        assert_close(
-            &vector(&fixed),
-            &vector(&newton),
-            2e-14,
-            &format!("{element}"),
-        );
-        assert_close(
-            &vector(&auto),
-            &vector(&newton),
-            2e-14,
-            &format!("{element}"),
-        );
-        assert_eq!(
-            (statistics.steps, statistics.fallbacks),
-            (30, 0),
-            "{element}"
-        );
-        assert_eq!(statistics.iterations, statistics.fixed_point_iterations);
-        // A larger matrix is kept from step to step while it serves, at the price of an iteration here and there.
-        assert!(newton_statistics.factorizations >= 1, "{newton_statistics}");
-        assert!(newton_statistics.iterations < 30 * 9, "{newton_statistics}");
-    }
-}
-
-#[test]
-fn a_linear_autonomous_model_is_factored_once() {
-    let l = OscillatorL {
-        m: 1.3,
-        d: 0.1,
-        k: 50.0,
-    };
-    let h = OscillatorH {
-        m: 1.3,
-        d: 0.1,
-        k: 50.0,
-    };
-    let start = State { q: [0.4], p: [1.0] };
-    for element in families(4) {
-        let (from_l, counts) = run_with(&l, element, Control::default(), start, 0.3, 50);
-        assert_eq!(
-            (counts.factorizations, counts.fixed_point_iterations),
-            (1, 0),
-            "{element}"
-        );
-        // Two a step, and one more for the first, which starts from nothing.
-        assert!(counts.iterations <= 2 * 50 + 1, "{element}: {counts}");
-        let (from_h, counts) = run_with(&h, element, Control::default(), start, 0.3, 50);
-        assert_eq!(
-            (counts.factorizations, counts.fixed_point_iterations),
-            (1, 0),
-            "{element}"
-        );
-        assert_close(
-            &vector(&from_l),
-            &vector(&from_h),
-            1e-12,
-            &format!("{element}"),
-        );
-    }
-}
-
-#[test]
-fn a_stiff_model_falls_back_and_remembers() {
-    let model = Stiff { k: 1e8 };
-    let start = State {
-        q: [1e-5, 1.0],
-        p: [0.0, 0.5],
-    };
-    let (end, statistics) = run_with(
-        &model,
-        Element::mixed(4),
-        Control::default(),
-        start,
-        0.1,
-        100,
-    );
-    let control = Control {
-        solve: Solve::Newton,
-        ..Control::default()
-    };
-    let (newton, _) = run_with(&model, Element::mixed(4), control, start, 0.1, 100);
-    assert!(
-        statistics.fallbacks >= 1 && statistics.fallbacks <= 10,
-        "{statistics}"
-    );
-    assert_close(&end.q, &newton.q, 1e-12, "coordinates");
-    let control = Control {
-        solve: Solve::FixedPoint,
-        ..Control::default()
-    };
-    let mut stepper = Stepper::new(&model, Element::mixed(4), control).expect("valid");
-    let mut state = start;
-    let error = stepper
-        .advance(0.0, 0.1, &mut state, &[])
-        .expect_err("no contraction");
-    assert!(
-        matches!(
-            error,
-            StepError::FixedPointStalled { .. } | StepError::NonFinite
-        ),
-        "{error}"
-    );
-    assert_eq!(state, start);
-}
-
-#[test]
 fn a_function_that_is_not_quadratic_in_velocities() {
     let model = Relativistic {};
     let start = State { q: [0.0], p: [3.0] };
@@ -466,112 +347,6 @@ fn steps_of_changing_length_and_direction() {
     }
     // Gauss methods are symmetric: the way back is the way there.
     assert_close(&vector(&state), &vector(&start), 1e-13, "there and back");
-}
-
-#[test]
-fn failures_are_typed_and_leave_the_state() {
-    let (model, start) = duffing();
-    let mut stepper = Stepper::new(&model, Element::mixed(4), Control::default()).expect("valid");
-    let mut state = start;
-    for h in [0.0, f64::NAN, f64::INFINITY] {
-        let error = stepper
-            .advance(0.0, h, &mut state, &[])
-            .expect_err("no step");
-        assert!(matches!(error, StepError::InvalidStep { .. }), "{error}");
-    }
-    let mut nowhere = State {
-        q: [f64::NAN],
-        p: [0.0],
-    };
-    assert_eq!(
-        stepper.advance(0.0, 0.1, &mut nowhere, &[]),
-        Err(StepError::NonFinite)
-    );
-    let endless = Impulse {
-        time: 0.0,
-        value: [f64::INFINITY],
-    };
-    assert_eq!(
-        stepper.advance(0.0, 0.1, &mut state, &[endless]),
-        Err(StepError::NonFinite)
-    );
-    assert_eq!(state, start);
-    stepper
-        .advance(0.0, 0.1, &mut state, &[])
-        .expect("as good as new");
-    let expected = run(&model, Element::mixed(4), start, 0.1, 1);
-    assert_close(
-        &vector(&state),
-        &vector(&expected),
-        2.0 * f64::EPSILON,
-        "after failures",
-    );
-
-    let control = Control {
-        max_iterations: 1,
-        ..Control::default()
-    };
-    let mut stepper = Stepper::new(&model, Element::mixed(4), control).expect("valid");
-    let error = stepper
-        .advance(0.0, 0.1, &mut state, &[])
-        .expect_err("one is too few");
-    assert!(
-        matches!(error, StepError::NewtonStalled { iterations: 1, .. }),
-        "{error}"
-    );
-
-    let control = Control {
-        max_iterations: 0,
-        solve: Solve::FixedPoint,
-        ..Control::default()
-    };
-    let mut stepper = Stepper::new(&model, Element::mixed(4), control).expect("valid");
-    let error = stepper.advance(0.0, 0.1, &mut state, &[]);
-    let error = error.expect_err("none is too few");
-    assert!(
-        matches!(error, StepError::FixedPointStalled { iterations: 0, .. }),
-        "{error}"
-    );
-
-    let massless = OscillatorL {
-        m: 0.0,
-        d: 0.0,
-        k: 1.0,
-    };
-    let singular = legendre::velocity(&massless, 0.0, &[1.0], &[1.0], &[0.0]);
-    assert_eq!(singular, Err(LegendreError::Singular { coordinate: 0 }));
-
-    let element = Element::mixed(4).with_rule(Rule::Gauss(2));
-    assert!(Stepper::new(&model, element, Control::default()).is_err());
-}
-
-/// Neither the polynomial nor the matrix of a step that failed is that of the step before.
-#[test]
-fn a_failed_step_has_no_inside() {
-    let (model, start) = duffing();
-    let element = Element::mixed(4);
-    let zero = State { q: [0.0], p: [0.0] };
-    for ends_only in [false, true] {
-        let mut stepper = Stepper::new(&model, element, Control::default()).expect("valid");
-        if ends_only {
-            stepper = stepper.ends_only();
-        }
-        let mut state = start;
-        stepper.advance(0.0, 0.1, &mut state, &[]).expect("a step");
-        let reached = state;
-        for h in [0.0, f64::NAN] {
-            let failed = stepper.advance(0.1, h, &mut state, &[]);
-            failed.expect_err("no step");
-            assert_eq!(state, reached);
-            assert_eq!(stepper.dense(0.1, 0.2).at(0.5), zero);
-            let matrix = stepper.transition(&mut [0.0; 4]);
-            assert_eq!(matrix, Err(transition::TransitionError::NoStep));
-        }
-        let next = stepper.advance(0.1, 0.1, &mut state, &[]);
-        next.expect("as good as new");
-        let expected = run(&model, element, start, 0.1, 2);
-        assert_close(&vector(&state), &vector(&expected), 1e-14, "after failures");
-    }
 }
 
 #[test]
