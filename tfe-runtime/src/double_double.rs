@@ -47,8 +47,30 @@ impl DoubleDouble {
         }
     }
 
-    /// a · b exactly, by splitting both factors into halves of 26 bits.
+    /// a · b exactly.
     pub(crate) const fn product(a: f64, b: f64) -> Self {
+        let product = Self::split_product(a, b);
+        if product.low.is_finite() {
+            product
+        } else {
+            Self::large_product(a, b)
+        }
+    }
+
+    /// The same for numbers beyond 10³⁰⁰, whose splitting overflows: the larger factor is scaled by a power of two.
+    #[cold]
+    const fn large_product(a: f64, b: f64) -> Self {
+        const SCALE: f64 = 18_014_398_509_481_984.0; // 2⁵⁴
+        let (large, other) = if a.abs() > b.abs() { (a, b) } else { (b, a) };
+        let product = Self::split_product(large / SCALE, other);
+        Self {
+            high: SCALE * product.high,
+            low: SCALE * product.low,
+        }
+    }
+
+    /// a · b exactly, by splitting both factors into halves of 26 bits; the low part is not finite if that overflows.
+    pub(crate) const fn split_product(a: f64, b: f64) -> Self {
         const SPLIT: f64 = 134_217_729.0; // 2²⁷ + 1
         let (at, bt) = (SPLIT * a, SPLIT * b);
         let (ah, bh) = (at - (at - a), bt - (bt - b));
@@ -129,6 +151,42 @@ mod tests {
         let tiny = DoubleDouble::new(1e-25);
         let kept = DoubleDouble::ONE.plus(tiny).minus(DoubleDouble::ONE);
         assert!((kept.high - 1e-25).abs() < 1e-31);
+    }
+
+    /// A finite number as an integer of 53 bits times a power of two.
+    fn integer_of(number: f64) -> (i128, i32) {
+        let bits = number.to_bits();
+        let exponent = i32::try_from((bits >> 52) & 0x7ff).expect("eleven bits");
+        let mantissa = i128::from((bits & ((1 << 52) - 1)) | (1 << 52));
+        (mantissa * number.signum() as i128, exponent - 1075)
+    }
+
+    /// Integers of 106 bits have all digits of a product.
+    #[test]
+    fn products_of_large_numbers_are_exact() {
+        for (a, b) in [
+            (1.1, 1.3),
+            (1.7e300, 1.1),
+            (-1.7e308, 1.0 / 3.0),
+            (0.7, 1.6e308),
+            (1e305, -3.3e-290),
+            (1.3e154, 1.3e154),
+            (f64::MAX, 1.0 - f64::EPSILON),
+        ] {
+            let product = DoubleDouble::product(a, b);
+            let ((x, by_x), (y, by_y)) = (integer_of(a), integer_of(b));
+            let ((high, by_high), (low, by_low)) =
+                (integer_of(product.high), integer_of(product.low));
+            let exponent = by_x + by_y;
+            // The low part has bits of the product only.
+            let down = u32::try_from(exponent - by_low).expect("below the last bit");
+            assert_eq!(low % (1 << down), 0, "{a:e} {b:e}");
+            let sum = (high << (by_high - exponent)) + (low >> down);
+            assert_eq!(sum, x * y, "{a:e} {b:e}");
+        }
+        let infinite = DoubleDouble::product(1e200, 1e200);
+        assert!(infinite.high == f64::INFINITY);
+        assert!(DoubleDouble::product(f64::NAN, 1e305).low.is_nan());
     }
 
     #[test]

@@ -115,7 +115,16 @@ pub(crate) fn put<V: Four>(four: V, numbers: &mut [f64], at: usize) {
 impl Precise for Lanes<4> {
     #[inline(always)]
     fn product(self, other: Self) -> (Self, Self) {
-        let (mut high, mut low) = (self, self);
+        let (mut high, mut low, mut sum) = (self, self, 0.0);
+        for lane in 0..4 {
+            let product = DoubleDouble::split_product(self.0[lane], other.0[lane]);
+            (high.0[lane], low.0[lane]) = (product.high, product.low);
+            // Zero, or NaN if a number is too large to be split.
+            sum += 0.0 * product.low;
+        }
+        if sum == 0.0 {
+            return (high, low);
+        }
         for lane in 0..4 {
             let product = DoubleDouble::product(self.0[lane], other.0[lane]);
             (high.0[lane], low.0[lane]) = (product.high, product.low);
@@ -250,6 +259,23 @@ pub(super) fn each_point<R: One, M, const N: usize>(
             first.z[a].0[lane] = one.z[a].value();
             first.q[a].0[lane] = one.q[a].value();
             first.force[a].0[lane] = one.force[a].value();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One number too large to be split, beside others; each lane as the number alone.
+    #[test]
+    fn products_beside_large_numbers_are_exact() {
+        let (a, b) = ([1.1, 1.5e305, -0.3, 7.0], [1.3, 1.1, 0.7, 1e-3]);
+        let (high, low) = Lanes(a).product(Lanes(b));
+        for lane in 0..4 {
+            let alone = DoubleDouble::product(a[lane], b[lane]);
+            assert!(low.0[lane].is_finite(), "{lane}");
+            assert_eq!((high.0[lane], low.0[lane]), (alone.high, alone.low));
         }
     }
 }
