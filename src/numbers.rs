@@ -31,6 +31,11 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a >= b { a } else { b }
 }
 
+/// The smaller of two numbers; NaN if one is NaN.
+pub(crate) fn smaller(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a <= b { a } else { b }
+}
+
 /// Raises a maximum to a new value; NaN is kept.
 pub(crate) fn raise(so_far: &mut f64, value: f64) {
     *so_far = larger(*so_far, value);
@@ -59,7 +64,7 @@ pub(crate) fn row_of(table: &[f64], columns: usize, row: usize) -> Option<&[f64]
 
 #[cfg(test)]
 mod tests {
-    use super::{Short, larger, row_of};
+    use super::{Short, larger, row_of, smaller};
 
     #[test]
     fn numbers_have_no_rows_of_zeros() {
@@ -85,5 +90,7 @@ mod tests {
     fn a_nan_stays_whatever_follows() {
         assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, larger).is_nan());
         assert_eq!([1.0, 3.0, 2.0].into_iter().fold(0.0, larger), 3.0);
+        assert!([1.0, f64::NAN, 2.0].into_iter().fold(0.0, smaller).is_nan());
+        assert_eq!([1.0, -3.0, 2.0].into_iter().fold(0.0, smaller), -3.0);
     }
 }

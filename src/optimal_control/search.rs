@@ -5,6 +5,7 @@ use super::correction::Step;
 use super::curvature::Descent;
 use super::problem::{Evaluation, Iterate, Problem};
 use crate::assembly::size;
+use crate::numbers::{larger, largest};
 use nalgebra::DVector;
 
 /// One iteration of the search.
@@ -135,11 +136,9 @@ impl Problem<'_> {
     fn gap(&self, evaluation: &Evaluation, iterate: &Iterate) -> f64 {
         let x = self.sizes.interior;
         let elements = &evaluation.rows[..self.blocks.len()];
-        let gaps = elements
-            .iter()
-            .map(|rows| rows.rows(x, rows.len() - x).amax());
-        let nodes = iterate.nodes.iter().map(DVector::amax);
-        let (gap, largest) = (gaps.fold(0.0, f64::max), nodes.fold(0.0, f64::max));
+        let gaps = elements.iter().map(|rows| largest(&rows.as_slice()[x..]));
+        let nodes = iterate.nodes.iter().map(|node| largest(node.as_slice()));
+        let (gap, largest) = (gaps.fold(0.0, larger), nodes.fold(0.0, larger));
         if gap == 0.0 { 0.0 } else { gap / largest }
     }
 

@@ -9,7 +9,7 @@ use super::setup::PeriodicOrbit;
 use crate::assembly::MeshError;
 use crate::linearised::Linearised;
 use crate::motion::{Motion, Setting};
-use crate::numbers::{larger, largest};
+use crate::numbers::{larger, largest, raise};
 use crate::periodic_schur::Multiplier;
 use crate::simulation::Simulation;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -427,10 +427,10 @@ pub(super) fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
         let mut sizes = [0.0_f64; N];
         for node in motion.states() {
             for (size, value) in sizes.iter_mut().zip(of(&node.state())) {
-                *size = size.max(value.abs());
+                raise(size, value.abs());
             }
         }
-        let largest = sizes.iter().fold(0.0_f64, |most, size| most.max(*size));
+        let largest = largest(&sizes);
         let largest = if largest > 0.0 { largest } else { 1.0 };
         own.extend(sizes.iter().map(|size| {
             let is_small = *size < SMALL * largest && *size > ROUNDINGS * largest;

@@ -1,7 +1,7 @@
 //! Derivatives of Floquet multipliers by a parameter, from difference quotients (T-157).
 
 use crate::differences::{NEARER, PART, WELL_KNOWN, is_next_to_zero, places};
-use crate::numbers::largest;
+use crate::numbers::{larger, largest};
 use crate::periodic_schur::Multiplier;
 use nalgebra::Complex;
 use std::f64::consts::PI;
@@ -13,7 +13,7 @@ const KNOWN: f64 = 1e-7;
 /// The difference step for a parameter of a given value; `parts` are relative changes per unit of the parameter.
 fn distance(value: f64, parts: impl IntoIterator<Item = f64>) -> f64 {
     let of_itself = if value == 0.0 { 0.0 } else { 1.0 / value.abs() };
-    let largest = parts.into_iter().fold(of_itself, f64::max);
+    let largest = parts.into_iter().fold(of_itself, larger);
     match largest > 0.0 && largest.is_finite() {
         true => PART / largest,
         false => PART,
@@ -30,7 +30,7 @@ pub(super) fn distance_of_period(period: f64, elements: usize) -> f64 {
 /// rounding errors, the step for the value zero is tried first.
 pub(super) fn distances(value: f64, parts: [f64; 3]) -> Vec<f64> {
     let own = distance(value, parts);
-    let largest = parts.into_iter().fold(0.0, f64::max);
+    let largest = parts.into_iter().fold(0.0, larger);
     match is_next_to_zero(value, (largest * value.abs(), 1.0)) {
         true => vec![distance(0.0, parts), own],
         false => vec![own],

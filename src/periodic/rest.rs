@@ -4,6 +4,7 @@ use super::error::OrbitError;
 use crate::assembly::AssemblyError;
 use crate::length::{Length, Polynomial};
 use crate::motion::Motion;
+use crate::numbers::{larger, largest, smaller};
 
 /// The residual motion of a coordinate at rest after Newton's method, relative to its largest value: its rounding
 /// error, amplified by the condition of the equations.
@@ -42,7 +43,7 @@ impl Extent {
             (self.low, self.high) = (q.to_vec(), q.to_vec());
         }
         for ((low, high), q) in self.low.iter_mut().zip(&mut self.high).zip(q) {
-            (*low, *high) = (low.min(*q), high.max(*q));
+            (*low, *high) = (smaller(*low, *q), larger(*high, *q));
         }
     }
 
@@ -61,17 +62,17 @@ impl Extent {
     /// The largest magnitude of each coordinate.
     fn sizes(&self) -> impl Iterator<Item = f64> {
         let bounds = self.low.iter().zip(&self.high);
-        bounds.map(|(low, high)| low.abs().max(high.abs()))
+        bounds.map(|(low, high)| larger(low.abs(), high.abs()))
     }
 
     /// Whether each coordinate is constant, up to the rounding error of its values now or in the guess.
     fn is_point(&self, guess: &Self) -> bool {
         let sizes = self.sizes().zip(guess.sizes());
-        let sizes: Vec<f64> = sizes.map(|(own, guess)| own.max(guess)).collect();
-        let largest = sizes.iter().fold(0.0_f64, |most, size| most.max(*size));
+        let sizes: Vec<f64> = sizes.map(|(own, guess)| larger(own, guess)).collect();
+        let largest = largest(&sizes);
         let mut ways = self.low.iter().zip(&self.high).zip(&sizes);
         // A NaN is not at rest.
-        ways.all(|((low, high), size)| high - low <= (LEFT * size).max(ROUNDINGS * largest))
+        ways.all(|((low, high), size)| high - low <= larger(LEFT * size, ROUNDINGS * largest))
     }
 }
 
@@ -127,5 +128,9 @@ mod tests {
         assert!(still.is_point(&still));
         let unknown = extent(&[[0.0, f64::NAN], [0.0, f64::NAN]]);
         assert!(!unknown.is_point(&guess));
+        // A NaN between numbers.
+        let passing = extent(&[[0.0, 0.0], [0.0, f64::NAN], [0.0, 0.0]]);
+        assert!(!passing.is_point(&guess));
+        assert!(!extent(&[[0.0, 0.0]]).is_point(&passing));
     }
 }

@@ -6,6 +6,7 @@ use super::value::{Function, Value};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 pub use crate::motion::Event;
+use crate::numbers::{larger, largest};
 use crate::simulation::kind::Simulated;
 use std::cell::Cell;
 use std::fmt;
@@ -210,11 +211,8 @@ where
         // rounding error.
         const MAX_SECANTS: u32 = 20;
         // The size of λ at which the impulse is as large as the momentum.
-        let size = |values: &L::Vector| {
-            let values = values.as_ref().iter();
-            values.fold(0.0_f64, |m, x| m.max(x.abs()))
-        };
-        let first = size(p).max(f64::MIN_POSITIVE.sqrt()) / size(&normal);
+        let size = |values: &L::Vector| largest(values.as_ref());
+        let first = larger(size(p), f64::MIN_POSITIVE.sqrt()) / size(&normal);
         let (mut before, mut next) = ((0.0, rate(v) - aim), first);
         let (mut least, mut steepest) = (f64::INFINITY, 0.0_f64);
         let mut after = None;

@@ -3,7 +3,7 @@
 use crate::differences::{SIXTH, derivative, derivative_of_either};
 use crate::error::RunErrorKind;
 use crate::length::Length;
-use crate::numbers::largest;
+use crate::numbers::{larger, largest};
 use crate::sensitivity::slopes::Change;
 use crate::simulation::events::act::{Act, Near, Occurrence, On, state_after};
 use crate::simulation::events::{Severed, Watched};
@@ -148,7 +148,7 @@ where
                 let change = derivative(way.distance, nearby) * way.distance / DISTANCE;
                 let known = names.iter().position(|own| own.is(&name));
                 let before = known.map_or(0.0, |index| self.model.parameter_value(index));
-                let size = value.abs().max(before.abs());
+                let size = larger(value.abs(), before.abs());
                 if !(change.abs() <= ROUNDINGS * size) {
                     return Some(RunErrorKind::SetByState {
                         event: self.severed.event.name.clone(),
@@ -205,10 +205,10 @@ where
         // scale.
         let rate = Change::<N, L>::of_column(&event.q, self.rate, 0);
         let step = self.severed.step.abs();
-        let q = scale(largest(&event.q).max(step * largest(&rate.q)));
-        let p = scale(largest(&event.p).max(step * largest(&rate.p)));
+        let q = scale(larger(largest(&event.q), step * largest(&rate.q)));
+        let p = scale(larger(largest(&event.p), step * largest(&rate.p)));
         let change = Change::<N, L>::of_column(&event.q, self.at, column);
-        let size = (largest(&change.q) / q).max(largest(&change.p) / p);
+        let size = larger(largest(&change.q) / q, largest(&change.p) / p);
         let time = self.times[column];
         (size != 0.0 || time != 0.0).then(|| Way {
             change,

@@ -3,6 +3,7 @@
 use crate::basis::{MAX_NODES, legendre};
 use crate::constrained::element::slopes;
 use crate::constrained::layout::Layout;
+use crate::legendre::largest;
 use crate::model::{Constraint, Model};
 use crate::scheme::{MAX_RATES, SchemeRef};
 use alloc::vec::Vec;
@@ -241,8 +242,7 @@ impl Found<'_> {
         /// Relative to the largest coefficient.
         const SMALL: f64 = 0.01;
         let rates = &self.numbers[..self.degree * coordinates];
-        let size = |rates: &[f64]| rates.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        size(&rates[(self.degree - 1) * coordinates..]) <= SMALL * size(rates)
+        largest(&rates[(self.degree - 1) * coordinates..]) <= SMALL * largest(rates)
     }
 
     /// The sum of Legendre polynomials at a time.
@@ -294,5 +294,26 @@ impl Found<'_> {
             let length = (2 * j * (j + 1)) as f64 / (2 * j + 1) as f64;
             show(Some(j), part / length);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_that_are_not_numbers_are_not_resolved() {
+        let is_resolved = |numbers: &[f64]| {
+            let found = Found {
+                span: (0.0, 1.0),
+                numbers,
+                degree: 2,
+            };
+            found.is_resolved(2)
+        };
+        assert!(is_resolved(&[1.0, 2.0, 1e-3, 0.0]));
+        assert!(!is_resolved(&[1.0, 2.0, 0.1, 0.0]));
+        assert!(!is_resolved(&[1.0, 2.0, 1e-3, f64::NAN]));
+        assert!(!is_resolved(&[f64::NAN, 2.0, 1e-3, 0.0]));
     }
 }

@@ -271,7 +271,8 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         }
         // If the start violates the constraints, the admissible velocity belongs to another momentum.
         let off = self.start.p.iter().zip(&self.node.slope);
-        let off = off.fold(0.0_f64, |off, (p, slope)| off.max((p - slope).abs()));
+        let off: Vec<f64> = off.map(|(p, slope)| p - slope).collect();
+        let off = largest(&off);
         let impulse =
             largest(&self.start.p).max(REST * extent / h.abs() * self.node.largest_mass());
         if !(off <= START_TOLERANCE * impulse || off == 0.0) {
