@@ -37,8 +37,11 @@ pub(super) struct Piece<'a, const N: usize, L: Length<N> = FixedLength> {
 /// Which side of an event a node is on.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
+    /// Before an event after which the run continues.
     Before,
     After,
+    /// At the event that ends the run.
+    Last,
 }
 
 /// An observer of what happens in an element.
@@ -177,7 +180,11 @@ where
             if let Some(dense) = inside.filter(|_| observer.keeps()) {
                 observer.inside(dense);
             }
-            observer.at_event(stepper, &self.model, Side::Before, (time, &at));
+            let side = match after {
+                Some(_) => Side::Before,
+                None => Side::Last,
+            };
+            observer.at_event(stepper, &self.model, side, (time, &at));
             observer.acted();
             let Some(After {
                 state: mut after,

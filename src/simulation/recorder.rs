@@ -221,7 +221,14 @@ where
         (t, state): (f64, &L::State),
     ) {
         self.is_conserved = false;
-        if side == Side::Before && self.motion.last().t == t {
+        let last = self.motion.last();
+        let is_recorded = match side {
+            Side::Before => last.t == t,
+            // Impulses at a node act after it, and may lead to an event there.
+            Side::Last => last.t == t && last.state() == *state,
+            Side::After => false,
+        };
+        if is_recorded {
             return;
         }
         self.record(stepper, model, (t, state));

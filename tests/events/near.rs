@@ -422,7 +422,21 @@ fn impulses_at_nodes_are_events_at_nodes() {
             let off = (event.v[0] - behind).abs();
             assert!(off < 1e-6 && event.rises, "{element}, {number}: {event:?}");
             if number == 3 {
-                assert_eq!(motion.last().t, 0.5);
+                // The node before the impulse, and the one at which the run stops.
+                let [.., before, last] = motion.states() else {
+                    panic!("{element}: {motion:?}");
+                };
+                assert_eq!((before.t, last.t), (0.5, 0.5));
+                assert!((before.p[0] - (behind - 1.0)).abs() < 1e-6, "{before:?}");
+                assert_eq!(last.p, event.p, "{element}");
+                assert!((last.v[0] - event.v[0]).abs() < 1e-14, "{last:?}");
+                let stopped = run.steps(start, 0.0).last().expect("a step");
+                assert_eq!(stopped.expect("a step").p, event.p, "{element}");
+                let sensitive = run.run_sensitive(start, 0.0..0.9).expect("derivatives");
+                assert_eq!(sensitive.motion().last().p, event.p, "{element}");
+                // The time of the impulse does not depend on the start: ∂p/∂q = −sin t.
+                let slope = sensitive.by_start().last()[(0, 1)];
+                assert!((slope + 0.5_f64.sin()).abs() < 1e-6, "{slope}");
                 continue;
             }
             if number == 2 {

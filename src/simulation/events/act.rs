@@ -40,7 +40,8 @@ impl Crossing {
 pub enum Act<const N: usize, L: Length<N> = FixedLength> {
     /// Record the event, as every event is, and continue as if nothing had happened, with the same bits.
     Record,
-    /// End the run at the event.
+    /// End the run at the event. The last node has the state of the event; if an impulse at a node has caused the
+    /// event, the node before it has the same time and the momentum before the impulse.
     Stop,
     /// End the element at the event, and continue from this state.
     Restart(L::State),
