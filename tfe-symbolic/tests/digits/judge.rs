@@ -17,8 +17,8 @@
 //! cosine counts as known to half an ulp of its own, and what the formula changes by such a change is added to the divisor. Losses are stated
 //! without and with this convention.
 //!
-//! States in which the formula itself overflows are left out, as are those at the kink of an `abs` or `select`, and those whose distance
-//! from it drowns in the rounding of the formula as written.
+//! States in which the formula itself overflows, or may lose numbers near the largest, are left out, as are those at the kink of an `abs` or
+//! `select`, and those whose distance from it drowns in the rounding of the formula as written. Entries without a state are counted.
 
 use std::time::{Duration, Instant};
 
@@ -31,7 +31,7 @@ use super::entries::{Entry, entries};
 use super::formula::{Schedule, State};
 use super::kernels::{Kernel, kernels, run};
 use super::random::Random;
-use super::reference::{Reference, UNDERFLOW, Value, distance};
+use super::reference::{MOST, Reference, UNDERFLOW, Value, distance};
 use super::states::{Regime, beside, regimes};
 use super::writer::Model;
 
@@ -67,6 +67,8 @@ pub struct Verdict {
     pub refused: Option<String>,
     /// How many pairs of entries and regimes were judged.
     pub judged: usize,
+    /// How many were not, since no state of the regime counts.
+    pub left_out: usize,
     /// How long the engine took, and how long the judgement.
     pub deriving: Duration,
     pub judging: Duration,
@@ -150,7 +152,10 @@ struct Worst {
 impl Case<'_> {
     fn judge(&self, verdict: &mut Verdict) {
         let mut reference = Reference::of(self.schedule, self.reverse, &self.regime.states);
-        verdict.judged += self.entries.len();
+        let has_values = |entry: &&Entry| !reference.values(entry).is_empty();
+        let judged = self.entries.iter().filter(has_values).count();
+        verdict.judged += judged;
+        verdict.left_out += self.entries.len() - judged;
         let suspect = |entry: &&Entry| {
             let values = reference.values(entry);
             let [error, difference] = self.worst(entry, &values);
@@ -181,6 +186,7 @@ impl Case<'_> {
                     .filter(|value| value.state < self.results.len());
                 let with_angles = judged
                     .map(|value| value.allowance() + reference.by_angles(value, entry))
+                    .filter(|allowed| *allowed <= MOST)
                     .chain([allowed]);
                 let loss = Loss {
                     loss: worst.error / largest(with_angles),

@@ -7,6 +7,9 @@ use super::formula::{Schedule, State, ulp};
 /// Added to what the formula may lose: below it, double-double numbers have no more digits than others.
 pub const UNDERFLOW: f64 = 1e-250;
 
+/// A state is left out where the formula may lose more than this: nothing could exceed a multiple of it.
+pub const MOST: f64 = f64::MAX / 1024.0;
+
 /// A state is left out where a switch is nearer to its kink than so many times the rounding of the formula.
 const KINK: f64 = 16.0;
 
@@ -74,21 +77,31 @@ impl<'a> Reference<'a> {
         self.usable = self.away_from_kinks();
     }
 
-    /// The value of an entry at all states that count: where the formula is finite and away from kinks.
+    /// The value of an entry at all states that count: where the formula is finite and away from kinks, and what it
+    /// loses is known.
     pub fn values(&self, entry: &Entry) -> Vec<Value> {
         let place = self.schedule.place(entry.formula);
         let other = self.reverse.place(entry.reverse);
         let value = |(state, values): (usize, &Values)| {
             let (plain, exact) = (values.plain[place], values.exact[place]);
             let reverse = values.reverse[other];
-            let rounding = distance(plain, exact).max(distance(reverse, exact));
+            let forward = distance(plain, exact);
+            // Reverse mode may overflow where forward mode does not.
+            let backward = distance(reverse, exact);
+            let rounding = if backward > forward {
+                backward
+            } else {
+                forward
+            };
             let finite = plain.is_finite() && exact.hi.is_finite() && exact.lo.is_finite();
-            (finite && self.usable[state]).then_some(Value {
+            let value = Value {
                 state,
                 plain,
                 exact,
                 rounding,
-            })
+            };
+            let is_known = value.allowance() <= MOST;
+            (finite && is_known && self.usable[state]).then_some(value)
         };
         self.values.iter().enumerate().filter_map(value).collect()
     }

@@ -83,18 +83,19 @@ pub fn table(outcomes: &[Outcome]) -> String {
     let mut text = String::new();
     let _ = writeln!(
         text,
-        "{:<12} {:>6} {:>7} {:>9} | {:^20} | {:^20} | {:^20} | {:>7} {:>7}",
+        "{:<12} {:>6} {:>7} {:>9} {:>9} | {:^20} | {:^20} | {:^20} | {:>7} {:>7}",
         "",
         "models",
         "refused",
         "judged",
+        "left out",
         "loss",
         "without angles",
         "kernels differ",
         "derive",
         "judge"
     );
-    let _ = write!(text, "{:<12} {:>6} {:>7} {:>9}", "", "", "", "");
+    let _ = write!(text, "{:<12} {:>6} {:>7} {:>9} {:>9}", "", "", "", "", "");
     for _ in 0..3 {
         let _ = write!(text, " | {:>6} {:>6} {:>6}", ">8", ">100", ">1e4");
     }
@@ -104,9 +105,10 @@ pub fn table(outcomes: &[Outcome]) -> String {
         let models: Vec<&Outcome> = outcomes.iter().filter(of_kind).collect();
         let refused = models.iter().filter(|one| one.verdict.refused.is_some());
         let judged: usize = models.iter().map(|one| one.verdict.judged).sum();
+        let left_out: usize = models.iter().map(|one| one.verdict.left_out).sum();
         let _ = write!(
             text,
-            "{kind:<12} {:>6} {:>7} {judged:>9}",
+            "{kind:<12} {:>6} {:>7} {judged:>9} {left_out:>9}",
             models.len(),
             refused.count(),
         );
