@@ -93,6 +93,10 @@ type Count = BTreeMap<&'static str, [u32; 2]>;
 
 const MOST_STEPS: f64 = 300.0;
 
+/// Some periods of the models. A longer step is solved in up to 1024 pieces. With events there may be a thousand of them
+/// in a step, each of which is found by up to eight such solutions, and a Hessian takes up to 49 gradients.
+const LONG_STEP: f64 = 10.0;
+
 fn are_finite<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> bool {
     numbers.into_iter().all(|number| number.is_finite())
 }
@@ -187,7 +191,8 @@ where
         let time = random.between(span.start, span.end);
         run = run.impulse(time, std::array::from_fn(|_| random.number()));
     }
-    if random.below(3) == 0 {
+    let has_events = random.below(3) == 0;
+    if has_events {
         let name = ["place", "speed"][random.below(2) as usize];
         let crossings = [Crossing::Rising, Crossing::Falling, Crossing::Either];
         run = run.on(name, crossings[random.below(3) as usize], act(random));
@@ -201,6 +206,12 @@ where
             [random.number()],
         ),
     };
+    // Orbits and boundary values take no step, and the ensembles here no events.
+    let is_run =
+        DERIVATIVES.contains(&which) || MOTIONS[..2].contains(&which) || which == "section";
+    if step.abs() > LONG_STEP && (which == "hessian" || is_run && has_events) {
+        return None; // it would take too long
+    }
     Some(match which {
         "run and its output" => ran(run.run(start, span), |motion| {
             // Velocities are NaN if a mass is zero, as documented.
