@@ -255,3 +255,44 @@ fn bennett() {
     let (jump, drift) = drift(0.04, 0.04 * f64::from(long_steps()));
     assert!(jump < 5e-7 && drift < 5e-7, "{jump:e}, {drift:e}");
 }
+
+/// The kinetic energy of a x′ + b y′ alone: the velocities of x and y are not determined.
+#[dynamics(
+    coordinates(x, y, z),
+    lagrangian = (a*dot(x) + b*dot(y))^2/2 + dot(z)^2/2,
+    constraint(level) = z,
+)]
+struct Undetermined {
+    a: f64,
+    b: f64,
+}
+
+/// The same where x and y move alike.
+#[dynamics(
+    coordinates(x, y, z),
+    lagrangian = (a*dot(x) + b*dot(y))^2/2 + dot(z)^2/2,
+    constraint(tied) = x - y,
+)]
+struct Tied {
+    a: f64,
+    b: f64,
+}
+
+/// The pivot of such a mass matrix is zero, or a rounding error.
+#[test]
+fn velocities_that_no_momentum_determines() {
+    use tfe::runtime::ConstraintError;
+    use tfe::{ConsistentError, StepError};
+    for (a, b) in [(0.3, 0.7), (0.1, 0.7), (1.0 / 3.0, 0.1), (1.1, 0.3)] {
+        let (q, v) = ([0.0; 3], [1.0, 1.0, 0.0]);
+        let error = Undetermined { a, b }.consistent_state(q, v);
+        let error = error.expect_err("many velocities have one momentum");
+        let singular = StepError::Constraint(ConstraintError::SingularMass);
+        assert_eq!(error, ConsistentError::Model(singular), "{a}, {b}");
+        let tied = Tied { a, b }.consistent_state(q, v);
+        let tied = tied.expect("one velocity of x and y");
+        for (found, given) in tied.velocities.iter().zip(v) {
+            assert!((found - given).abs() <= 1e-13, "{a}, {b}: {tied:?}");
+        }
+    }
+}

@@ -1,6 +1,6 @@
 //! Constraints at one instant: the velocity that belongs to a momentum, independent rows, residuals.
 
-use crate::constrained::rows::Rows;
+use crate::constrained::rows::{DEPENDENT, Rows, norm, scaled, subtract_part, unit};
 use crate::error::{ConstraintError, LegendreError, StepError};
 use crate::legendre::{lagrangian_view_from, velocity as free_velocity};
 use crate::lu;
@@ -68,6 +68,10 @@ where
             vector[N + c] = if *mark == 0 { 0.0 } else { -rows.psi(c, &v) };
         }
         lu::factor(size, matrix, pivots).map_err(|_| ConstraintError::SingularMass)?;
+        let is_suspect = (0..size).any(|a| lu::is_lost(size, matrix, a, ROUNDINGS));
+        if is_suspect && is_singular_where_allowed(&zz, rows, active) {
+            return Err(ConstraintError::SingularMass.into());
+        }
         // The multiplier is solved for anew in each iteration: it enters linearly.
         lu::solve(size, matrix, pivots, vector);
         let (mut step, mut scale) = (0.0_f64, 0.0_f64);
@@ -89,6 +93,80 @@ where
         residual: last,
     }
     .into())
+}
+
+/// A pivot below this fraction of the terms subtracted from it is a rounding error.
+const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
+
+/// Whether the mass matrix is singular, up to rounding, for the velocities that the marked rows allow. Rows that are
+/// nearly dependent lead to small pivots as well, but leave the velocity determined.
+///
+/// With coordinates in units of their inertias, P M P + 1 − P is factored, where P projects on the allowed velocities.
+/// False where a coordinate has no inertia of its own, and so no such unit.
+#[cold]
+#[inline(never)]
+fn is_singular_where_allowed<const N: usize>(
+    zz: &[[f64; N]; N],
+    rows: &Rows<'_, N>,
+    active: &[usize],
+) -> bool {
+    let mut units = [1.0; N];
+    for a in 0..N {
+        let root = crate::real::Real::sqrt(zz[a][a].abs());
+        if !(root > 0.0 && root.is_finite()) {
+            return false;
+        }
+        units[a] = 1.0 / root;
+    }
+    let (mut basis, mut rank) = ([[0.0; N]; N], 0);
+    for (c, mark) in active.iter().enumerate() {
+        let mut row = rows.rows[c];
+        for a in 0..N {
+            row[a] *= units[a];
+        }
+        let length = norm(&row);
+        if *mark == 0 || !(length > 0.0) || rank == N {
+            continue;
+        }
+        row = scaled(&row, length);
+        for direction in &basis[..rank] {
+            subtract_part(&mut row, direction);
+        }
+        if norm(&row) > DEPENDENT {
+            basis[rank] = unit(&row);
+            rank += 1;
+        }
+    }
+    let mut mass = *zz;
+    for a in 0..N {
+        for b in 0..N {
+            mass[a][b] *= units[a] * units[b];
+        }
+    }
+    // M P, and then (M P)ᵀ P
+    for _ in 0..2 {
+        for row in &mut mass {
+            for direction in &basis[..rank] {
+                subtract_part(row, direction);
+            }
+        }
+        let rows = mass;
+        for a in 0..N {
+            for b in 0..N {
+                mass[a][b] = rows[b][a];
+            }
+        }
+    }
+    for direction in &basis[..rank] {
+        for a in 0..N {
+            for b in 0..N {
+                mass[a][b] += direction[a] * direction[b];
+            }
+        }
+    }
+    // A NaN counts as singular.
+    lu::factor(N, mass.as_flattened_mut(), &mut [0; N]).is_err()
+        || !(0..N).all(|a| mass[a][a].abs() > ROUNDINGS)
 }
 
 /// Writes [ L_vv Aᵀ ; A 0 ] with the marked rows into zeros, and a one on the diagonal for each of the other rows.
