@@ -26,6 +26,9 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
     /// The rounding error of the energy, if it is a difference of nearly equal numbers; zero if unknown.
     fn energy_rounding(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
 
+    /// The rounding error of forces, if they are differences of nearly equal numbers; zero if unknown.
+    fn force_rounding(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
+
     /// Writes the outputs, if the model has any.
     fn outputs(
         &self,
@@ -102,6 +105,10 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
         legendre::energy_rounding(self, t, q, p, velocity)
     }
 
+    fn force_rounding(&self, t: f64, (q, p): (&[f64; N], &[f64; N]), velocity: &[f64; N]) -> f64 {
+        legendre::force_rounding(self, t, q, p, velocity)
+    }
+
     fn outputs(
         &self,
         t: f64,
@@ -158,6 +165,10 @@ impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
 
     fn energy_rounding(&self, t: f64, (q, p): (&Vec<f64>, &Vec<f64>), velocity: &Vec<f64>) -> f64 {
         family::energy_rounding(self, t, (q, p), velocity)
+    }
+
+    fn force_rounding(&self, t: f64, (q, p): (&Vec<f64>, &Vec<f64>), velocity: &Vec<f64>) -> f64 {
+        family::force_rounding(self, t, (q, p), velocity)
     }
 
     fn outputs(

@@ -268,7 +268,8 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
             element += 1;
         }
         let ends = (&before.state(), &after.state());
-        let is_same = is_same::<N, FixedLength>(&state, ends, 0.0);
+        let place = (before.t, after.t - before.t);
+        let is_same = is_same::<M, N, FixedLength>(self.model, place, &state, ends, 0.0);
         Ok(is_same.then_some(motion))
     }
 
@@ -297,7 +298,8 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
             let is_cut_alike = inside.is_empty() || inside.len() == pieces;
             let after = motion.states()[number + 1].state();
             // If iterations stop at a tolerance, forward sensitivities are those of what was computed.
-            let is_same = is_same::<N, FixedLength>(&state, (&before, &after), 0.0);
+            let (place, ends) = ((time, step), (&before, &after));
+            let is_same = is_same::<M, N, FixedLength>(self.model, place, &state, ends, 0.0);
             if !(is_same && is_cut_alike) {
                 return Ok(false);
             }

@@ -73,7 +73,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             let steps = steps.map(|one| ((one.t, one.h, &one.before), directions(one)));
             let each = |transition: TransitionOperator| {
                 let element = &elements[passed];
-                element.check(transition.end(), self.control.tolerance)?;
+                element.check(&*model, transition.end(), self.control.tolerance)?;
                 follower.element(&*model, element, &transition)?;
                 passed += 1;
                 if passed == end {

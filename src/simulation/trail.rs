@@ -5,8 +5,10 @@ use super::events::{Severed, Watched};
 use super::follow::{Follow, Passed};
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
+use crate::evaluate::Evaluate;
 use crate::length::{Length, RunTimeLength};
 use crate::motion::{Event, Motion, Node};
+use crate::numbers::{larger, largest};
 use std::convert::identity;
 use std::ops::{ControlFlow, Range};
 use tfe_runtime::Share;
@@ -55,40 +57,74 @@ impl Element {
 
     /// Checks that the element, solved again, ends where it did, within the tolerance of the iteration.
     #[cfg(feature = "sparse")]
-    pub(super) fn check(
+    pub(super) fn check<M: family::Model>(
         &self,
+        model: &M,
         again: &FamilyState,
         tolerance: f64,
     ) -> Result<(), family::OperatorError> {
-        match is_same::<0, RunTimeLength>(again, (&self.before, &self.after), tolerance) {
+        let (place, ends) = ((self.t, self.h), (&self.before, &self.after));
+        match is_same::<M, 0, RunTimeLength>(model, place, again, ends, tolerance) {
             true => Ok(()),
             false => Err(family::OperatorError::Cut),
         }
     }
 }
 
-/// Whether an element or a motion that was solved again from `start` ends at `end` as before. The agreement asked for
-/// is far closer than that of two different solutions. Differences are relative to the larger one of start and end,
-/// since the motion may come to rest or pass the origin; both solutions may have the error of the tolerance.
-pub(super) fn is_same<const N: usize, L: Length<N>>(
+/// Whether an element or a motion over a time `h` that was solved again from `start` ends at `end` as before. The
+/// agreement asked for is far closer than that of two different solutions. Differences are relative to the larger one of
+/// start and end, since the motion may come to rest or pass the origin; both solutions may have the error of the
+/// tolerance. In an equilibrium all numbers may be rounding errors of forces.
+pub(super) fn is_same<M, const N: usize, L>(
+    model: &M,
+    (t, h): (f64, f64),
     again: &L::State,
     (start, end): (&L::State, &L::State),
     tolerance: f64,
-) -> bool {
+) -> bool
+where
+    M: Evaluate<N, L>,
+    L: Length<N>,
+{
     const SAME: f64 = 1e-9;
     /// In tolerances: both solutions have an error, and the tolerance may be relative to a larger component.
     const LEFT: f64 = 4.0;
 
     let same = SAME.max(LEFT * tolerance);
-    let near = |again: &L::Vector, start: &L::Vector, end: &L::Vector| {
+    let near = |again: &L::Vector, start: &L::Vector, end: &L::Vector, least: f64| {
         let (again, start, end) = (again.as_ref(), start.as_ref(), end.as_ref());
-        let both = start.iter().chain(end);
-        let largest = both.fold(0.0_f64, |m, x| m.max(x.abs()));
+        let most = larger(same * larger(largest(start), largest(end)), least);
         let mut pairs = again.iter().zip(end);
-        pairs.all(|(a, b)| (a - b).abs() <= same * largest.max(1e-6))
+        pairs.all(|(a, b)| (a - b).abs() <= most)
     };
-    let (again, start, end) = (L::parts(again), L::parts(start), L::parts(end));
-    near(again.0, start.0, end.0) && near(again.1, start.1, end.1)
+    let both = |(least_q, least_p): (f64, f64)| {
+        let (again, start, end) = (L::parts(again), L::parts(start), L::parts(end));
+        near(again.0, start.0, end.0, least_q) && near(again.1, start.1, end.1, least_p)
+    };
+    both((0.0, 0.0)) || both(roundings::<M, N, L>(model, (t, h), start))
+}
+
+/// By how much coordinates and momenta may change in a time `h` due to rounding errors of forces.
+fn roundings<M, const N: usize, L>(model: &M, (t, h): (f64, f64), state: &L::State) -> (f64, f64)
+where
+    M: Evaluate<N, L>,
+    L: Length<N>,
+{
+    /// The number of rounding errors of forces in an element.
+    const MANY: f64 = 16.0;
+
+    let (q, p) = L::parts(state);
+    let Some(v) = model.velocity(t, state, &L::zero(p)) else {
+        return (0.0, 0.0);
+    };
+    let impulse = MANY * (h * model.force_rounding(t, (q, p), &v)).abs();
+    let kicked = L::state(q.clone(), L::from_fn(p, |a| p.as_ref()[a] + impulse));
+    let Some(faster) = model.velocity(t, &kicked, &v) else {
+        return (0.0, impulse);
+    };
+    let pairs = faster.as_ref().iter().zip(v.as_ref());
+    let changes = pairs.map(|(faster, v)| (faster - v).abs());
+    (h.abs() * changes.fold(0.0, larger), impulse)
 }
 
 /// An event that has cut an element: an owned copy of [`Severed`].
@@ -373,6 +409,62 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M>
     fn recorded(&mut self, node: &Node<0, RunTimeLength>) {
         if self.keeps_nodes {
             self.add(Between::Node(node.clone()));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_same;
+    use crate::length::FixedLength;
+    use crate::{State, dynamics};
+
+    /// A body on a spring that is stretched by `lead` where x = 0.
+    #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*(x + lead)^2 + m*g*x)]
+    struct Hanging {
+        m: f64,
+        k: f64,
+        lead: f64,
+        g: f64,
+    }
+
+    fn compare(model: &Hanging, again: [f64; 2], start: [f64; 2], end: [f64; 2]) -> bool {
+        let state = |[x, p]: [f64; 2]| State { q: [x], p: [p] };
+        let (again, start, end) = (state(again), state(start), state(end));
+        is_same::<Hanging, 1, FixedLength>(model, (0.0, 0.1), &again, (&start, &end), 0.0)
+    }
+
+    #[test]
+    fn other_ends_are_told_in_all_units() {
+        let free = Hanging {
+            m: 1.0,
+            k: 1.0,
+            lead: 0.0,
+            g: 0.0,
+        };
+        for size in [1.0, 1e-20, 1e-150, 1e20] {
+            let of = |x: f64, p: f64| {
+                let (start, end) = ([size, 0.0], [0.5 * size, -0.8 * size]);
+                compare(&free, [x * size, p * size], start, end)
+            };
+            assert!(of(0.5, -0.8) && of(0.5 + 1e-12, -0.8 - 1e-12), "{size:e}");
+            assert!(!of(0.5 + 1e-6, -0.8) && !of(0.5, -0.8 + 1e-6), "{size:e}");
+            assert!(!of(f64::NAN, -0.8), "{size:e}");
+        }
+    }
+
+    /// The weight and the spring cancel but for a rounding error, and all numbers are such errors.
+    #[test]
+    fn equilibria_end_where_they_begin() {
+        let hanging = Hanging {
+            m: 1.0,
+            k: 10.0,
+            lead: 0.981,
+            g: 9.81,
+        };
+        for (again, is_same) in [([2e-19, -3e-17], true), ([0.0, 1e-9], false)] {
+            let found = compare(&hanging, again, [0.0; 2], [1e-19, 1e-17]);
+            assert_eq!(found, is_same, "{again:?}");
         }
     }
 }

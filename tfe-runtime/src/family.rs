@@ -192,10 +192,39 @@ pub fn energy_rounding<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v:
         Form::Lagrangian => v,
         Form::Hamiltonian => p,
     };
-    let exactly = |x: &f64| Enclosure::between(*x, *x);
-    let exact = |values: &[f64]| -> Vec<Enclosure> { values.iter().map(exactly).collect() };
     let bounds = model.energy_function(exactly(&t), &exact(q), &exact(z));
     bounds.width()
+}
+
+/// The possible rounding error of forces; see [`legendre::force_rounding`](crate::legendre::force_rounding).
+#[cfg(feature = "std")]
+#[must_use]
+#[cold]
+pub fn force_rounding<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v: &[f64]) -> f64 {
+    let z = match M::FORM {
+        Form::Lagrangian => v,
+        Form::Hamiltonian => p,
+    };
+    let zeros = || vec![Enclosure::ZERO; q.len()];
+    let (mut by_z, mut by_q, mut force) = (zeros(), zeros(), zeros());
+    let first = Gradient {
+        z: &mut by_z,
+        q: &mut by_q,
+        force: &mut force,
+    };
+    model.first(exactly(&t), &exact(q), &exact(z), first);
+    let bounds = by_q.iter().chain(&force);
+    bounds.map(|bounds| bounds.width()).fold(0.0, f64::max)
+}
+
+#[cfg(feature = "std")]
+fn exactly(x: &f64) -> Enclosure {
+    Enclosure::between(*x, *x)
+}
+
+#[cfg(feature = "std")]
+fn exact(values: &[f64]) -> Vec<Enclosure> {
+    values.iter().map(exactly).collect()
 }
 
 /// The largest |φ| and the largest |A v + a| over all constraints; zeros if there are none.

@@ -140,6 +140,31 @@ where
     bounds.width()
 }
 
+/// A bound of the rounding errors of forces where they are differences of nearly equal numbers, as in an equilibrium:
+/// the largest width of the enclosures of L_q (or H_q) and Q at (q, p). Zero where nothing is known.
+#[cfg(feature = "std")]
+#[cold]
+pub fn force_rounding<M, const N: usize>(
+    model: &M,
+    t: f64,
+    q: &[f64; N],
+    p: &[f64; N],
+    v: &[f64; N],
+) -> f64
+where
+    M: Model<N>,
+{
+    let z = match M::FORM {
+        Form::Hamiltonian => p,
+        Form::Lagrangian => v,
+    };
+    let exactly = |x: f64| Enclosure::between(x, x);
+    let mut first = First::<Enclosure, N>::zero();
+    model.first(exactly(t), &q.map(exactly), &z.map(exactly), &mut first);
+    let bounds = first.q.iter().chain(&first.force);
+    bounds.map(|bounds| bounds.width()).fold(0.0, f64::max)
+}
+
 /// The energy H(q, p, t); for a Lagrangian p·v − L.
 ///
 /// # Errors

@@ -171,7 +171,9 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 return Ok(None);
             };
             let ends = (&before.state(), &after.state());
-            if !is_same::<0, RunTimeLength>(&again.last().state(), ends, self.control.tolerance) {
+            let (place, tolerance) = ((from, to - from), self.control.tolerance);
+            let end = again.last().state();
+            if !is_same::<M, 0, RunTimeLength>(&*self.model, place, &end, ends, tolerance) {
                 return Ok(None);
             }
             let (value, seen) = part.seen(&again, &*self.model)?;
@@ -214,7 +216,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 let inside = view.of_element(backwards, &motion.elements()[number])?;
                 let place = (element.t, element.h);
                 let end = backwards.pass(place, &element.before, inside.first())?;
-                element.check(&end, self.control.tolerance)?;
+                element.check(&*self.model, &end, self.control.tolerance)?;
                 if let Some(kicked) = &element.kicked {
                     backwards.kick(element.t, &kicked.with)?;
                 }
