@@ -5,7 +5,7 @@
 
 use super::error::AssemblyError;
 use crate::numbers::{larger, norm};
-use tfe_runtime::constrained::{self, START_TOLERANCE};
+use tfe_runtime::constrained::{self, START_TOLERANCE, Scales};
 use tfe_runtime::{Model, State};
 
 /// The body counts as at rest if it moves less than this part of the largest position in one element, as in runs.
@@ -17,13 +17,16 @@ struct Left {
     position: f64,
     /// |A v + a| divided by the norm of its row A.
     velocity: f64,
+    /// Both relative to the size of the terms of the constraint (T-165).
+    own: (f64, f64),
 }
 
 /// Refuses a solution that violates a constraint by more than the larger one of `tolerance` and the limit for the start
 /// of a run.
 ///
 /// Positions are checked at all nodes, velocities at all but the first: the momentum prescribed at the start may
-/// violate the constraints, and the first element removes that part.
+/// violate the constraints, and the first element removes that part. Violations are relative to all positions and
+/// velocities of the motion, and to the size of the terms of the constraint itself.
 pub(super) fn check<M: Model<N>, const N: usize>(
     model: &M,
     (times, nodes): (&[f64], &[State<N>]),
@@ -34,6 +37,12 @@ pub(super) fn check<M: Model<N>, const N: usize>(
     let (mut drift, mut values) = (vec![0.0; declared.len()], vec![0.0; declared.len()]);
     let extent = nodes.iter().map(|node| norm(&node.q)).fold(0.0, larger);
     let step = (times[nodes.len() - 1] - times[0]).abs() / (nodes.len() - 1) as f64;
+    let scales = Scales {
+        h: step,
+        extent,
+        tolerance: 0.0,
+    };
+    let still = [0.0; N];
     let mut speed = REST * extent / step;
     let mut left = Vec::with_capacity(nodes.len() * declared.len());
     for (place, (t, node)) in times.iter().zip(nodes).enumerate() {
@@ -45,6 +54,8 @@ pub(super) fn check<M: Model<N>, const N: usize>(
         if let Some(v) = &v {
             speed = larger(speed, norm(v));
         }
+        let at = (&node.q, v.as_ref().unwrap_or(&still));
+        let own = constrained::own_residuals(model, *t, at, scales);
         for (c, row) in rows.iter().enumerate() {
             let length = norm(row);
             let length = if length > 0.0 { length } else { 1.0 };
@@ -56,13 +67,18 @@ pub(super) fn check<M: Model<N>, const N: usize>(
             left.push(Left {
                 position: values[c].abs() / length,
                 velocity: v.as_ref().map_or(0.0, rate).abs() / length,
+                own: (own[c].0, v.as_ref().map_or(0.0, |_| own[c].1)),
             });
         }
     }
     let allowed = START_TOLERANCE.max(tolerance);
     for (place, left) in left.iter().enumerate() {
-        for (off, scale, position) in [(left.position, extent, true), (left.velocity, speed, false)]
-        {
+        for (off, scale, position) in [
+            (left.position, extent, true),
+            (left.velocity, speed, false),
+            (left.own.0, 1.0, true),
+            (left.own.1, 1.0, false),
+        ] {
             // A NaN is a violation.
             if !(off <= allowed * scale) {
                 return Err(AssemblyError::Violated {

@@ -30,6 +30,43 @@ struct TwoBlades {
     gs: f64,
 }
 
+/// The same beside a coordinate that is far away, but the second length grows.
+#[dynamics(
+    coordinates(x, y, z),
+    lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - g*y,
+    constraint(rod) = x^2 + y^2 - 1,
+    constraint(length) = sqrt(x^2 + y^2) - 1 - c*t^2,
+)]
+struct Parting {
+    g: f64,
+    c: f64,
+}
+
+/// Ends of steps are compared with the size of each constraint: beside 1e9 these constraints parted without an error.
+#[test]
+fn constraints_that_part_are_told_in_mixed_units() {
+    use tfe::runtime::ConstraintError;
+    use tfe::{RunErrorKind, StepError};
+    let run = |c: f64, far: f64| {
+        let model = Parting { g: 9.81, c };
+        let start = model.state([1.0, 0.0, far], [0.0, 0.5, 0.0]);
+        let motion = Simulation::new(&model).step(0.1).run(start, 0.0..0.2);
+        motion.map_err(|error| error.kind().clone())
+    };
+    for far in [0.0, 1e9] {
+        assert!(run(0.0, far).is_ok(), "{far:e}");
+        let kind = run(1.0, far).expect_err("constraints that contradict");
+        let RunErrorKind::Solve { source, .. } = kind else {
+            panic!("{far:e}: {kind}");
+        };
+        let is_told = matches!(
+            source,
+            StepError::Constraint(ConstraintError::Dependent { .. })
+        );
+        assert!(is_told, "{far:e}: {source}");
+    }
+}
+
 /// Two cranks of lengths r and 2r on one slider.
 #[dynamics(
     coordinates(x, a, b),

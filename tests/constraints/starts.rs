@@ -146,6 +146,51 @@ fn projections_at_a_time_and_of_rates() {
     assert!((found.state.p[0] - 3.0).abs() < 1e-14 && found.state.p[1].abs() < 1e-14);
 }
 
+/// A rod beside a coordinate that is far away.
+#[dynamics(
+    coordinates(x, y, z),
+    lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - g*y,
+    constraint(rod) = x^2 + y^2 - 1,
+)]
+struct RodBeside {
+    g: f64,
+}
+
+/// A stepper without a run checks its start itself: beside 1e9 a rod that was too long by a tenth was accepted, and one
+/// whose length changed.
+#[test]
+fn steppers_check_their_starts_in_mixed_units() {
+    use tfe::StepError;
+    use tfe::runtime::ConstraintError;
+    use tfe::runtime::step::{Control, Stepper};
+    let model = RodBeside { g: 9.81 };
+    let step = |q: [f64; 3], v: [f64; 3]| {
+        let stepper = Stepper::new(&model, Mixed::<4>.into(), Control::default());
+        let mut state = model.state(q, v);
+        let mut stepper = stepper.expect("an element");
+        stepper.advance(0.0, 0.01, &mut state, &[])
+    };
+    for far in [0.0, 1e9, 1.5e11] {
+        let long = ([1.1, 0.0, far], [0.0; 3]);
+        let growing = ([1.0, 0.0, far], [1e-3, 0.5, 0.0]);
+        for ((q, v), of_position) in [(long, true), (growing, false)] {
+            let error = step(q, v).expect_err("a start beside the constraint");
+            let StepError::Constraint(ConstraintError::Start {
+                constraint,
+                position,
+                ..
+            }) = error
+            else {
+                panic!("{far:e}: {error}");
+            };
+            assert!(constraint.is("rod"), "{far:e}: {error}");
+            assert_eq!(position, of_position, "{far:e}: {error}");
+        }
+        let good = step([1.0, 0.0, far], [0.0, 0.5, 0.0]);
+        assert_eq!(good, Ok(()), "{far:e}");
+    }
+}
+
 /// On the unit circle and at x = 2: no solution.
 #[dynamics(
     coordinates(x, y),

@@ -223,6 +223,46 @@ fn rods_far_from_the_origin_have_their_lengths() {
     assert!(text.contains("`rod[2]`: position off by"), "{text}");
 }
 
+/// Rods beside a coordinate that is far away: their lengths may not change, in whatever units.
+#[test]
+fn rods_keep_their_lengths_in_mixed_units() {
+    #[dynamics(
+        coordinates(x[n], y[n], z[n]),
+        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2 + dot(z[i])^2)/2 - g*y[i]),
+        constraint(rod[i in 0..n]) = x[i]^2 + y[i]^2 - 1,
+    )]
+    struct Hanging {
+        n: usize,
+        g: f64,
+    }
+    let model = Hanging { n: 2, g: 9.81 };
+    for far in [0.0, 1e9, 1.5e11] {
+        let q = [1.0, 0.0, 0.0, -1.0, far, 0.0];
+        let run = |along: f64| {
+            // The second component is along the second rod.
+            let start = model.state(q, [0.0, 0.3, 0.5, along, 0.0, 0.0]);
+            Simulation::new(&model).step(0.01).run(start, 0.0..0.01)
+        };
+        let good = run(0.0);
+        assert!(good.is_ok(), "{far:e}: {:?}", good.err());
+        let error = run(1e-3).expect_err("a rod that grows");
+        assert!(
+            matches!(
+                error.kind(),
+                RunErrorKind::Solve {
+                    source: StepError::Constraint(ConstraintError::Start {
+                        constraint,
+                        position: false,
+                        ..
+                    }),
+                    ..
+                } if constraint.is("rod[1]")
+            ),
+            "{far:e}: {error}"
+        );
+    }
+}
+
 #[test]
 fn what_cannot_hold_constraints_is_refused() {
     let (model, (q, v)) = (rods(), start());

@@ -234,6 +234,38 @@ fn constraints_that_contradict_have_no_motion_between_ends() {
     }
 }
 
+/// Beside a coordinate of 1e9 a contradiction of a tenth is as large as without it.
+#[test]
+fn contradictions_are_found_in_mixed_units() {
+    #[dynamics(
+        coordinates(x, y, z),
+        lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - g*y,
+        constraint(rod) = x^2 + y^2 - 1,
+        constraint(length) = sqrt(x^2 + y^2) - l,
+    )]
+    struct TwiceBeside {
+        g: f64,
+        l: f64,
+    }
+    let far = 1e9;
+    let beside = move |t: f64| {
+        let ([x, y], [vx, vy]) = swing(0.5, 1.0, t);
+        ([x, y, far], [vx, vy, 0.0])
+    };
+    let twice = TwiceBeside { g: 1.0, l: 1.1 };
+    let (q, v) = beside(0.0);
+    let arc = BoundaryValue::of(&twice)
+        .elements(10)
+        .initial(twice.state(q, v), 0.0..1.0)
+        .guess(beside)
+        .solve();
+    let error = arc.map(|arc| arc.end()).expect_err("a contradiction");
+    let BoundaryError::Assembly(AssemblyError::Violated { constraint, .. }) = error else {
+        panic!("{error}");
+    };
+    assert_eq!(constraint, "length");
+}
+
 /// With two elements per period, their nodes do not determine the direction of the flow, and reactions are part of it.
 #[test]
 fn a_free_swing_of_two_elements() {

@@ -14,6 +14,7 @@ mod held_velocity;
 mod instant;
 pub(crate) mod layout;
 pub(crate) mod node;
+pub(crate) mod own;
 pub(crate) mod residual;
 pub(crate) mod rows;
 #[cfg(feature = "std")]
@@ -30,7 +31,7 @@ pub use held_velocity::HeldVelocity;
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
 #[cfg(feature = "std")]
-pub use start::start_residuals;
+pub use start::{Scales, own_residuals, start_residuals};
 #[cfg(feature = "alloc")]
 pub use states::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
 #[cfg(feature = "alloc")]

@@ -5,6 +5,7 @@ use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
 use crate::constrained::layout::refused;
 use crate::constrained::node::{Bordered, own_velocity, solve_velocity};
+use crate::constrained::own::violated;
 use crate::constrained::residual::relative_residual;
 use crate::constrained::rows::Rows;
 use crate::control::START_TOLERANCE;
@@ -114,7 +115,8 @@ where
             &rows,
             parts.active,
         )?;
-        check_start(method.model, t, h, state, &v, &rows)?;
+        let left = method.control.with_constraints().tolerance;
+        check_start(method.model, (t, h, left), state, &v, &rows)?;
         start_velocity = v;
         combine(method.model, &mut rows, (t, h), &state.q, &v, parts.active);
     }
@@ -176,7 +178,7 @@ where
     if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
         return Err(StepError::NonFinite);
     }
-    form.check_end(scratch.unknowns)?;
+    form.check_end(scratch.unknowns, control.tolerance)?;
     let end_rows = form.constraints.rows.independence();
     // Constraints that depend on the time do work.
     let is_conserved = conserves_energy::<M, N>()
@@ -265,11 +267,10 @@ fn end_velocity<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [
     v
 }
 
-/// Refuses a start that violates the constraints.
+/// Refuses a start that violates the constraints by more than the tolerance of iterations may have left.
 fn check_start<M, const N: usize>(
     model: &M,
-    t: f64,
-    h: f64,
+    (t, h, left): (f64, f64, f64),
     state: &State<N>,
     v: &[f64; N],
     rows: &Rows<'_, N>,
@@ -278,18 +279,25 @@ where
     M: Model<N>,
 {
     let v = own_velocity(model, t, &state.q, &state.p, v)?;
-    for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+    let refused = |c: usize, position: bool, residual: f64| {
+        Err(ConstraintError::Start {
+            constraint: CoordinateName::single(M::CONSTRAINTS[c].name),
+            position,
+            residual,
+        }
+        .into())
+    };
+    for c in 0..M::CONSTRAINTS.len() {
         let (position, velocity) = relative_residual(rows, c, &state.q, &v, h);
         for (residual, is_position) in [(position, true), (velocity, false)] {
             if !(residual <= START_TOLERANCE) {
-                return Err(ConstraintError::Start {
-                    constraint: CoordinateName::single(constraint.name),
-                    position: is_position,
-                    residual,
-                }
-                .into());
+                return refused(c, is_position, residual);
             }
         }
     }
-    Ok(())
+    let declared = (!rows.is_combined()).then_some(rows);
+    match violated(model, t, (&state.q, &v), (h, left), declared) {
+        Some((c, is_position, residual)) => refused(c, is_position, residual),
+        None => Ok(()),
+    }
 }

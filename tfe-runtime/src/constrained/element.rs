@@ -12,6 +12,7 @@
 //! dependent velocity rows are replaced by μ = 0.
 
 use crate::constrained::layout::Layout;
+use crate::constrained::own::violated;
 use crate::constrained::residual::relative_residual;
 use crate::constrained::rows::Rows;
 use crate::control::START_TOLERANCE;
@@ -244,26 +245,36 @@ where
         Ok((State { q: end.q, p: end.p }, low))
     }
 
-    /// Checks that all constraints hold at the end, including those that were omitted as dependent.
-    pub(crate) fn check_end(&mut self, x: &[f64]) -> Result<(), StepError> {
+    /// Checks that all constraints hold at the end, including those that were omitted as dependent. These are not
+    /// solved for, so that they are also compared with the size of their own terms.
+    pub(crate) fn check_end(&mut self, x: &[f64], tolerance: f64) -> Result<(), StepError> {
         let (t, q, v) = self.end_place(x);
         self.constraints
             .rows
             .evaluate_declared(self.inner.model, t, &q);
-        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
-            let (position, velocity) =
-                relative_residual(&self.constraints.rows, c, &q, &v, self.inner.span.h);
+        let (rows, h) = (&self.constraints.rows, self.inner.span.h);
+        let refused = |c: usize, residual: f64| {
+            Err(ConstraintError::Dependent {
+                constraint: M::CONSTRAINTS[c].name,
+                residual,
+            }
+            .into())
+        };
+        for c in 0..M::CONSTRAINTS.len() {
+            let (position, velocity) = relative_residual(rows, c, &q, &v, h);
             for residual in [position, velocity] {
                 if !(residual <= START_TOLERANCE) {
-                    return Err(ConstraintError::Dependent {
-                        constraint: constraint.name,
-                        residual,
-                    }
-                    .into());
+                    return refused(c, residual);
                 }
             }
         }
-        Ok(())
+        if self.constraints.active.iter().all(|mark| *mark == 1) {
+            return Ok(());
+        }
+        match violated(self.inner.model, t, (&q, &v), (h, tolerance), Some(rows)) {
+            Some((c, _, residual)) => refused(c, residual),
+            None => Ok(()),
+        }
     }
 
     /// The residual at x, and on request its derivative.

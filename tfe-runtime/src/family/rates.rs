@@ -14,6 +14,7 @@ use super::blocked::Blocked;
 use super::dense::DenseElement;
 use super::error::ModelError;
 use super::held::Solved;
+use super::inertia::Legendre;
 use super::model::{FamilyState, Gradient, Model};
 use super::node::Node;
 use super::pattern::Pattern;
@@ -242,6 +243,19 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         Ok(())
     }
 
+    /// The velocity that belongs to the momentum of the start without regard to the constraints; `None` if that is the
+    /// admissible one, or if there is none.
+    fn own_velocity(&self, t: f64) -> Option<Vec<f64>> {
+        /// Momenta that differ by less have velocities that are the same, as far as starts are checked.
+        const SAME: f64 = 1e-12;
+
+        let mut pairs = self.start.p.iter().zip(&self.node.slope);
+        let differ = |(p, slope): (&f64, &f64)| (p - slope).abs() > SAME * (p.abs() + slope.abs());
+        let differ = pairs.any(differ);
+        let velocity = || Legendre::default().velocity(&*self.model, t, &self.start);
+        differ.then(velocity)?.ok()
+    }
+
     /// Refuses a start that violates the constraints.
     fn check_start(&mut self, t: f64, h: f64) -> Result<(), StepError> {
         if self.constraints == 0 || !self.refuses {
@@ -264,10 +278,12 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
                 return refused(row, true, distance / extent);
             }
         }
-        let at = (t, &self.start.q[..]);
-        let least = self.control.with_constraints().tolerance * extent;
-        if let Some((row, part)) = violated(&*self.model, at, &self.rows, least) {
-            return refused(row, true, part);
+        let v = self.own_velocity(t);
+        let at = (&self.start.q[..], v.as_deref());
+        let tolerance = self.control.with_constraints().tolerance;
+        let found = violated(&*self.model, (t, h), at, &self.rows, tolerance);
+        if let Some((row, position, part)) = found {
+            return refused(row, position, part);
         }
         // If the start violates the constraints, the admissible velocity belongs to another momentum.
         let off = self.start.p.iter().zip(&self.node.slope);
