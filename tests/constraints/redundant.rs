@@ -105,6 +105,44 @@ fn short_cranks_are_two_conditions() {
     }
 }
 
+/// The same with a third condition that follows from the two.
+#[dynamics(
+    coordinates(x, a, b),
+    lagrangian = m/2*dot(x)^2 + m*r^2/2*(dot(a)^2 + dot(b)^2),
+    constraint(first) = x - r*cos(a),
+    constraint(second) = x - 2*r*sin(b),
+    constraint(both) = 3*x - r*cos(a) - 4*r*sin(b),
+)]
+struct CranksThrice {
+    m: f64,
+    r: f64,
+}
+
+/// Three rows that are nearly (1, 0, 0), of which two are independent, are combined in units of inertia: of the
+/// combinations one was lost, so that the second crank moved freely.
+#[test]
+fn short_redundant_cranks_are_two_conditions() {
+    let ends = [1.0, 1e-11].map(|r| {
+        let model = CranksThrice { m: 1.0, r };
+        let (a, rate) = (1.0_f64, 1.0);
+        let b = (0.5 * a.cos()).asin();
+        let v = [-r * a.sin() * rate, rate, -0.5 * a.sin() * rate / b.cos()];
+        let start = model.state([r * a.cos(), a, b], v);
+        let run = Simulation::new(&model).element(Mixed::<4>).step(0.01);
+        let motion = run.run(start, 0.0..2.0).expect("a run");
+        assert_eq!(motion.constraint_residual().rank, 2, "{r:e}");
+        for node in motion.states() {
+            let off = node.q[1].cos() - 2.0 * node.q[2].sin();
+            assert!(off.abs() <= 1e-8, "{r:e}, t = {}: {off:e}", node.t);
+        }
+        motion.last().q
+    });
+    for k in 1..3 {
+        let off = ends[1][k] - ends[0][k];
+        assert!(off.abs() <= 1e-8, "{off:e}");
+    }
+}
+
 #[test]
 fn two_equations_for_one_rod() {
     let (one, two) = (

@@ -64,14 +64,14 @@ where
     if !warm {
         parts.active.fill(0);
     }
-    choose(&mut rows, method.model, (t, &state.q), parts.active);
+    let units = choose(&mut rows, method.model, (t, &state.q), parts.active);
     let mean = mean_rate(&scheme, parts.unknowns[..layout.rates()].as_chunks().0);
     combine(
         method.model,
         &mut rows,
         (t, h),
         &state.q,
-        &mean,
+        (&mean, &units),
         parts.active,
     );
     if warm && rows.is_combined() {
@@ -118,7 +118,15 @@ where
         let left = method.control.with_constraints().tolerance;
         check_start(method.model, (t, h, left), state, &v, &rows)?;
         start_velocity = v;
-        combine(method.model, &mut rows, (t, h), &state.q, &v, parts.active);
+        let moving = (&v, &units);
+        combine(
+            method.model,
+            &mut rows,
+            (t, h),
+            &state.q,
+            moving,
+            parts.active,
+        );
     }
     let mut scratch = Scratch {
         unknowns: parts.unknowns,
@@ -230,13 +238,13 @@ fn mean_rate<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64
     mean
 }
 
-/// Replaces linearly dependent rows by combinations, for an element with this mean rate.
+/// Replaces linearly dependent rows by combinations, for an element with this mean rate and coordinates in these units.
 fn combine<M, const N: usize>(
     model: &M,
     rows: &mut Rows<'_, N>,
     (t, h): (f64, f64),
     start: &[f64; N],
-    rate: &[f64; N],
+    (rate, units): (&[f64; N], &[f64; N]),
     active: &mut [usize],
 ) where
     M: Model<N>,
@@ -250,7 +258,7 @@ fn combine<M, const N: usize>(
         middle[a] += 0.5 * h * rate[a];
     }
     let places = [(t, start), (t + 0.5 * h, &middle)];
-    rows.combine(model, places, rate, active);
+    rows.combine(model, places, (rate, units), active);
 }
 
 /// The velocity at the end of the element, from the polynomial of the rates.

@@ -1,7 +1,7 @@
 //! Which rows are independent, in the units that the kinetic energy gives to coordinates where their lengths do not tell.
 
 use super::node::is_regular;
-use super::rows::{DEPENDENT, Rows, norm, scaled, subtract_part, unit};
+use super::rows::{DEPENDENT, Rows, in_units, norm, scaled, subtract_part, unit};
 use crate::model::{Constraint, First, Form, Model};
 
 /// Below it what a dependent row has of its own is rounding.
@@ -14,20 +14,25 @@ const CLEAR: f64 = 1e-6;
 /// As [`Rows::choose`], but independent of units. Beside angles, the lengths of 1e-11 m in `x - r*cos(a)` and
 /// `x - l*cos(b)` are so small that both rows seem to be equal. So if rows were left out whose orthogonal parts are more
 /// than rounding errors, coordinates are measured in the square roots of their inertias.
+///
+/// Returns the units in which all marked rows are independent; ones unless more rows were found in other units.
 pub(crate) fn choose<M, const N: usize>(
     rows: &mut Rows<'_, N>,
     model: &M,
     (t, q): (f64, &[f64; N]),
     active: &mut [usize],
-) where
+) -> [f64; N]
+where
     M: Model<N>,
 {
+    let plain = [1.0; N];
     if const { M::CONSTRAINTS.is_empty() } {
-        return;
+        return plain;
     }
     let rank = rows.choose(M::CONSTRAINTS, active);
-    if rank < active.len() && rows.has_left(active) {
-        choose_more(rows, model, (t, q), active);
+    match rank < active.len() && rows.has_left(active) {
+        true => choose_more(rows, model, (t, q), active).unwrap_or(plain),
+        false => plain,
     }
 }
 
@@ -38,14 +43,15 @@ fn choose_more<M, const N: usize>(
     model: &M,
     (t, q): (f64, &[f64; N]),
     active: &mut [usize],
-) where
+) -> Option<[f64; N]>
+where
     M: Model<N>,
 {
     let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
     model.first_and_mass(t, q, &[0.0; N], &mut first, &mut zz);
     // Coordinates without an inertia of their own have no such unit.
     if !is_regular(zz) {
-        return;
+        return None;
     }
     let mut units = [0.0; N];
     for a in 0..N {
@@ -55,9 +61,13 @@ fn choose_more<M, const N: usize>(
             Form::Hamiltonian => root,
         };
     }
-    if units.iter().all(|unit| unit.is_finite() && *unit > 0.0) {
-        rows.choose_in_units(M::CONSTRAINTS, &units, active);
+    if !units.iter().all(|unit| unit.is_finite() && *unit > 0.0) {
+        return None;
     }
+    let rank = |active: &[usize]| active.iter().filter(|mark| **mark != 0).count();
+    let before = rank(active);
+    rows.choose_in_units(M::CONSTRAINTS, &units, active);
+    (rank(active) > before).then_some(units)
 }
 
 impl<const N: usize> Rows<'_, N> {
@@ -70,9 +80,7 @@ impl<const N: usize> Rows<'_, N> {
     /// Marks more rows, those that are independent of the marked ones beyond doubt.
     fn choose_in_units(&mut self, declared: &[Constraint], units: &[f64; N], active: &mut [usize]) {
         for (spare, row) in self.spare.iter_mut().zip(&*self.rows) {
-            for a in 0..N {
-                spare[a] = row[a] * units[a];
-            }
+            *spare = in_units(row, units);
             let length = norm(spare);
             *spare = if length > 0.0 {
                 scaled(spare, length)

@@ -2,8 +2,8 @@
 //! T-132).
 
 use super::rows::{
-    COMBINED, Constrains, DEPENDENT, Rows, add_row, dot, has_digits, longest, norm, scaled,
-    scaled_norm, subtract_part, unit,
+    COMBINED, Constrains, DEPENDENT, Rows, add_row, dot, has_digits, in_units, longest, norm,
+    scaled, scaled_norm, subtract_part, unit,
 };
 use crate::legendre::largest;
 
@@ -19,12 +19,12 @@ impl<const N: usize> Rows<'_, N> {
     /// depend on the choice, scaling or combination of the given rows.
     ///
     /// `places` are time and position at the start and, as far as it is known, in the middle; `rate` is the velocity
-    /// there.
+    /// there. Lengths and angles are those of coordinates measured in `units`.
     pub(crate) fn combine(
         &mut self,
         model: &dyn Constrains<N>,
         places: [(f64, &[f64; N]); 2],
-        rate: &[f64; N],
+        (rate, units): (&[f64; N], &[f64; N]),
         active: &mut [usize],
     ) {
         let declared = model.declared();
@@ -34,16 +34,16 @@ impl<const N: usize> Rows<'_, N> {
         let [start, (time, middle)] = places;
         // The middle is known only to order h², and away from the constraints more rows are independent: without this
         // correction the result would depend on which rows are given.
-        let middle = self.nearest(model, (time, middle), rank);
+        let middle = self.nearest(model, (time, middle), units, rank);
         let middle = (time, &middle);
         self.evaluate_declared(model, middle.0, middle.1);
         self.weights.fill(0.0);
         for c in 0..count {
-            self.lengths[c] = norm(&self.rows[c]);
+            self.lengths[c] = norm(&in_units(&self.rows[c], units));
             self.spare[c] = [0.0; N];
         }
         for c in holonomic().filter(|&c| self.lengths[c] > 0.0) {
-            self.spare[c] = scaled(&self.rows[c], self.lengths[c]);
+            self.spare[c] = scaled(&in_units(&self.rows[c], units), self.lengths[c]);
         }
         for c in holonomic() {
             active[c] = 0;
@@ -55,7 +55,7 @@ impl<const N: usize> Rows<'_, N> {
             active[place] = COMBINED;
         }
         self.basis.copy_from_slice(self.weights);
-        self.turn_least(model, middle, rate, active);
+        self.turn_least(model, middle, (rate, units), active);
         for c in 0..count {
             if !declared[c].kind.is_holonomic() {
                 self.weights[c * count + c] = 1.0;
@@ -82,19 +82,21 @@ impl<const N: usize> Rows<'_, N> {
         &mut self,
         model: &dyn Constrains<N>,
         (t, from): (f64, &[f64; N]),
+        units: &[f64; N],
         rank: usize,
     ) -> [f64; N] {
         const MOST: u32 = 12;
         const NEAR: f64 = 4.0 * f64::EPSILON;
         let mut at = *from;
         for _ in 0..MOST {
-            let mut change = at;
-            at = self.moved_to_tangents(model, t, [from, &at], rank);
+            let (mut change, mut place) = (at, at);
+            at = self.moved_to_tangents(model, t, [from, &at], units, rank);
             for a in 0..N {
-                change[a] -= at[a];
+                change[a] = (change[a] - at[a]) / units[a];
+                place[a] = at[a] / units[a];
             }
             // A NaN is not near.
-            if largest(&change) <= NEAR * largest(&at) {
+            if largest(&change) <= NEAR * largest(&place) {
                 return at;
             }
         }
@@ -107,19 +109,21 @@ impl<const N: usize> Rows<'_, N> {
         model: &dyn Constrains<N>,
         t: f64,
         [from, at]: [&[f64; N]; 2],
+        units: &[f64; N],
         rank: usize,
     ) -> [f64; N] {
         self.evaluate_declared(model, t, at);
         // The rows are normalised, and the right-hand sides with them.
         for (c, row) in self.rows.iter().enumerate() {
-            let length = norm(row);
+            let measured = in_units(row, units);
+            let length = norm(&measured);
             if !model.declared()[c].kind.is_holonomic() || length == 0.0 {
                 (self.spare[c], self.values[c]) = ([0.0; N], 0.0);
                 continue;
             }
             let back: f64 = (0..N).map(|a| row[a] * (from[a] - at[a])).sum();
             self.values[c] = (self.values[c] + back) / length;
-            self.spare[c] = unit(row);
+            self.spare[c] = unit(&measured);
         }
         let mut moved = *from;
         for _ in 0..rank {
@@ -129,7 +133,7 @@ impl<const N: usize> Rows<'_, N> {
             let direction = unit(&self.spare[row]);
             let step = -self.values[row] / own;
             for a in 0..N {
-                moved[a] += step * direction[a];
+                moved[a] += step * direction[a] * units[a];
             }
             for (row, value) in self.spare.iter_mut().zip(&mut *self.values) {
                 *value += step * dot(row, &direction);
@@ -148,7 +152,7 @@ impl<const N: usize> Rows<'_, N> {
         &mut self,
         model: &dyn Constrains<N>,
         (t, q): (f64, &[f64; N]),
-        rate: &[f64; N],
+        (rate, units): (&[f64; N], &[f64; N]),
         active: &[usize],
     ) {
         let declared = model.declared();
@@ -161,13 +165,13 @@ impl<const N: usize> Rows<'_, N> {
         self.mu.fill(0.0);
         // At rest any direction is as good as another.
         let is_at_rest = rate.iter().all(|rate| *rate == 0.0);
-        let rate = if is_at_rest { &[1.0; N] } else { rate };
+        let rate = if is_at_rest { units } else { rate };
         self.differentiate(model, t, q, rate);
         let mut largest = 0.0_f64;
         for c in 0..count {
             let (rates, length) = (&mut self.rates[c], self.lengths[c]);
             *rates = if holonomic(c) && length > 0.0 {
-                scaled(rates, length)
+                scaled(&in_units(rates, units), length)
             } else {
                 [0.0; N]
             };

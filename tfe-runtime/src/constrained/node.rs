@@ -1,6 +1,6 @@
 //! Constraints at one instant: the velocity that belongs to a momentum, independent rows, residuals.
 
-use crate::constrained::rows::{DEPENDENT, Rows, norm, scaled, subtract_part, unit};
+use crate::constrained::rows::{DEPENDENT, Rows, in_units, norm, scaled, subtract_part, unit};
 use crate::error::{ConstraintError, LegendreError, StepError};
 use crate::legendre::{lagrangian_view_from, velocity as free_velocity};
 use crate::lu;
@@ -120,10 +120,7 @@ fn is_singular_where_allowed<const N: usize>(
     }
     let (mut basis, mut rank) = ([[0.0; N]; N], 0);
     for (c, mark) in active.iter().enumerate() {
-        let mut row = rows.rows[c];
-        for a in 0..N {
-            row[a] *= units[a];
-        }
+        let mut row = in_units(&rows.rows[c], &units);
         let length = norm(&row);
         if *mark == 0 || !(length > 0.0) || rank == N {
             continue;

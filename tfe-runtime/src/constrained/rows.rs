@@ -414,6 +414,15 @@ pub(super) fn add_row(matrix: &mut [f64], (from, to): (usize, usize), part: f64)
     }
 }
 
+/// A row by coordinates that are measured in these units.
+pub(super) fn in_units<const N: usize>(row: &[f64; N], units: &[f64; N]) -> [f64; N] {
+    let mut changed = *row;
+    for a in 0..N {
+        changed[a] *= units[a];
+    }
+    changed
+}
+
 /// A row divided by a length.
 pub(super) fn scaled<const N: usize>(row: &[f64; N], length: f64) -> [f64; N] {
     let mut scaled = *row;
