@@ -174,7 +174,8 @@ pub trait ConsistentState<const N: usize>: Model<N> + Sized {
 
     /// The consistent state nearest to (q, v) at the time t.
     ///
-    /// The coordinates move to the nearest point with φ(q, t) = 0, in the sense of least |δq|. The velocities then
+    /// The coordinates move to the nearest point with φ(q, t) = 0, in the sense of least |δq|; where constraints of tiny
+    /// lengths beside angles are independent only in the units of the kinetic energy, in these. The velocities then
     /// change to satisfy A v + a = 0 with the least kinetic energy ½ δvᵀ L_vv δv of the change, as by an impulse of
     /// the reactions. Without constraints, the state itself is returned.
     ///
@@ -277,7 +278,14 @@ fn step_to_constraints<M: Model<N>, const N: usize>(
     if holonomic.is_empty() {
         return None;
     }
-    // Rows are normalised, so that the rank does not depend on the units of constraints.
+    // Rows are normalised, so that the rank does not depend on the units of constraints, nor on those of coordinates
+    // where these are very different.
+    let units = constrained::units(model, t, q);
+    for row in &mut rows {
+        for (entry, unit) in row.iter_mut().zip(&units) {
+            *entry *= unit;
+        }
+    }
     let length = |c: usize| {
         let length = rows[c].iter().map(|a| a * a).sum::<f64>().sqrt();
         if length > 0.0 { length } else { 1.0 }
@@ -288,10 +296,11 @@ fn step_to_constraints<M: Model<N>, const N: usize>(
     let phi = DVector::from_fn(holonomic.len(), |row, _| {
         values[holonomic[row]] / length(holonomic[row])
     });
-    let back = DVector::from_fn(N, |a, _| given[a] - q[a]);
+    let back = DVector::from_fn(N, |a, _| (given[a] - q[a]) / units[a]);
     let inverse = a.clone().pseudo_inverse(1e-10).ok()?;
     let tangent = &back - &inverse * (&a * &back);
-    Some(tangent - inverse * phi)
+    let step = tangent - inverse * phi;
+    Some(DVector::from_fn(N, |a, _| step[a] * units[a]))
 }
 
 /// An orthonormal basis of the variations (δp, δq) that the constraints allow at a state: a matrix of 2N rows, ordered

@@ -143,6 +143,32 @@ fn short_redundant_cranks_are_two_conditions() {
     }
 }
 
+/// Starts near short cranks are found as those near long ones: the difference of both conditions was left out.
+#[test]
+fn starts_of_short_cranks_are_those_of_long_ones() {
+    fn near<M: Model<3>>(model: &M, r: f64) -> [f64; 3] {
+        let (q, v) = ([1.1 * r * 1.0_f64.cos(), 1.0, 0.3], [0.0, 1.0, 0.0]);
+        let found = model.consistent_state(q, v);
+        let found = found.unwrap_or_else(|error| panic!("{r:e}: {error}"));
+        let [x, a, b] = found.state.q;
+        assert_eq!(found.rank, 2, "{r:e}");
+        for off in [x / r - a.cos(), x / r - 2.0 * b.sin()] {
+            assert!(off.abs() <= 1e-13, "{r:e}: {off:e}");
+        }
+        [x / r, a, b]
+    }
+    let all = [1.0, 1e-11].map(|r| {
+        let (m, thrice) = (1.0, CranksThrice { m: 1.0, r });
+        [near(&Cranks { m, r }, r), near(&thrice, r)]
+    });
+    // The inertias of long cranks are one.
+    for places in [all[0][1], all[1][0], all[1][1]] {
+        for (found, expected) in places.iter().zip(&all[0][0]) {
+            assert!((found - expected).abs() <= 1e-9, "{all:?}");
+        }
+    }
+}
+
 #[test]
 fn two_equations_for_one_rod() {
     let (one, two) = (

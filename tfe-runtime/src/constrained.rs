@@ -33,7 +33,7 @@ pub use instant::{Gradients, gradients, reactions};
 #[cfg(feature = "std")]
 pub use start::{Scales, own_residuals, start_residuals};
 #[cfg(feature = "alloc")]
-pub use states::{Residual, independent, residuals, velocity, velocity_for, velocity_of};
+pub use states::{Residual, independent, residuals, units, velocity, velocity_for, velocity_of};
 #[cfg(feature = "alloc")]
 pub(crate) use trail::Foreseen;
 #[cfg(feature = "alloc")]

@@ -88,6 +88,19 @@ where
     active.into_iter().map(|mark| mark != 0).collect()
 }
 
+/// The units of the coordinates in which the independence of constraints shows at a position: ones or, for lengths that
+/// are tiny beside angles, those that the kinetic energy gives to each coordinate.
+#[must_use]
+pub fn units<M, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> [f64; N]
+where
+    M: Model<N>,
+{
+    let count = M::CONSTRAINTS.len();
+    let mut memory = vec![0.0; rows_len(N, count)];
+    let mut rows = evaluated(model, (t, q), &mut memory);
+    choose(&mut rows, model, (t, q), &mut vec![0; count])
+}
+
 /// The rows at a position, and marks of the independent ones, in memory of [`rows_len`] numbers.
 pub(super) fn chosen<'a, M, const N: usize>(
     model: &M,
