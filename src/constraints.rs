@@ -11,7 +11,7 @@ use allowed::Held;
 use nalgebra::{DMatrix, DVector};
 use std::fmt;
 use tfe_runtime::constrained::{self, Residual};
-use tfe_runtime::{LegendreError, Model, State, StepError, legendre};
+use tfe_runtime::{LegendreError, Model, ModelError, State, StepError, legendre};
 
 /// A consistent state, which satisfies all constraints, with its distance from the values given.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +43,8 @@ pub enum ConsistentError {
     /// A value is not finite, or the mass matrix is singular there, so that no momentum or velocity belongs to the
     /// state.
     Model(StepError),
+    /// The model does not pass its [check](Model::check).
+    Check(ModelError),
 }
 
 impl fmt::Display for ConsistentError {
@@ -59,11 +61,18 @@ impl fmt::Display for ConsistentError {
                 write_residuals(f, residuals)
             }
             Self::Model(source) => source.fmt(f),
+            Self::Check(source) => source.fmt(f),
         }
     }
 }
 
 impl std::error::Error for ConsistentError {}
+
+impl From<ModelError> for ConsistentError {
+    fn from(error: ModelError) -> Self {
+        Self::Check(error)
+    }
+}
 
 impl From<StepError> for ConsistentError {
     fn from(error: StepError) -> Self {
@@ -180,8 +189,8 @@ pub trait ConsistentState<const N: usize>: Model<N> + Sized {
     /// the reactions. Without constraints, the state itself is returned.
     ///
     /// # Errors
-    /// [`ConsistentError`] if the constraints are not reached from (q, v), or if a value is not finite or the mass
-    /// matrix is singular there.
+    /// [`ConsistentError`] if the constraints are not reached from (q, v), if a value is not finite or the mass matrix is
+    /// singular there, or if the model does not pass its check.
     fn consistent_state_at(
         &self,
         t: f64,
@@ -203,6 +212,7 @@ fn consistent<M: Model<N>, const N: usize>(
     given: [f64; N],
     v: [f64; N],
 ) -> Result<Consistent<N>, ConsistentError> {
+    model.check()?;
     let mut q = given;
     let (mut last, mut iterations) = (f64::INFINITY, 0);
     while let Some(step) = step_to_constraints::<M, N>(model, t, &given, &q) {
@@ -314,7 +324,8 @@ fn step_to_constraints<M: Model<N>, const N: usize>(
 /// is the identity.
 ///
 /// # Errors
-/// [`StepError`] if no velocity belongs to the momenta at the state.
+/// [`StepError`] if no velocity belongs to the momenta at the state, or the model does not pass its
+/// [check](Model::check).
 pub fn tangent_basis<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
@@ -322,6 +333,9 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
 ) -> Result<DMatrix<f64>, StepError> {
     if const { M::CONSTRAINTS.is_empty() } {
         return Ok(DMatrix::identity(2 * N, 2 * N));
+    }
+    if model.check().is_err() {
+        return Err(StepError::Inconsistent);
     }
     let v = constrained::velocity(model, t, &state.q, &state.p, &[0.0; N])?;
     let gradients = constrained::gradients(model, t, state, &v)?;

@@ -21,8 +21,8 @@ pub enum RunErrorKind {
     /// The element does not exist: an impossible number of nodes, or a quadrature that this family of elements does
     /// not have.
     Element(ElementError),
-    /// For models of run-time length: lengths that do not fit each other, or something that such models do not
-    /// support.
+    /// The model does not pass its [check](crate::Model::check): an index that its fields make is outside its array, or
+    /// lengths do not fit each other. For models of run-time length also something that such models do not support.
     Family(family::ModelError),
     /// The step size is zero, infinite or not a number. It is not a number (NaN) if a run without an end was given no
     /// step size.
@@ -247,6 +247,14 @@ impl RunErrorKind {
                 step,
                 source,
             },
+        }
+    }
+
+    /// The error of a stepper of a model of fixed size that could not be made.
+    pub(crate) fn of_stepper(error: family::ModelError) -> Self {
+        match error {
+            family::ModelError::Element(error) => Self::Element(error),
+            error => Self::Family(error),
         }
     }
 

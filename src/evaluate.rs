@@ -4,10 +4,18 @@ use crate::constraints::ConstraintResidual;
 use crate::length::{FixedLength, Length, RunTimeLength};
 use crate::numbers::larger;
 use tfe_runtime::family::{self, FamilyState};
-use tfe_runtime::{Constraint, CoordinateName, Form, Model, State, constrained, legendre};
+use tfe_runtime::{
+    Constraint, CoordinateName, Form, Model, ModelError, State, constrained, legendre,
+};
 
 /// Evaluates a model at points of phase space: every [`Model`] and every [`family::Model`], and nothing else.
 pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
+    /// Whether it may be evaluated at all: lengths and indices fit each other.
+    ///
+    /// # Errors
+    /// The first that does not.
+    fn checked(&self) -> Result<(), ModelError>;
+
     /// The names of the coordinates.
     fn coordinate_names(&self) -> Vec<CoordinateName>;
 
@@ -81,6 +89,10 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
     const IS_CONSTRAINED: bool = !M::CONSTRAINTS.is_empty();
     const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
 
+    fn checked(&self) -> Result<(), ModelError> {
+        self.check()
+    }
+
     fn coordinate_names(&self) -> Vec<CoordinateName> {
         names(N, &M::coordinate_name)
     }
@@ -142,6 +154,10 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
 impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
     const IS_CONSTRAINED: bool = M::CONSTRAINED;
     const NEEDS_VELOCITY: bool = matches!(M::FORM, Form::Lagrangian);
+
+    fn checked(&self) -> Result<(), ModelError> {
+        self.check()
+    }
 
     fn coordinate_names(&self) -> Vec<CoordinateName> {
         names(self.len(), &|a| self.coordinate_name(a))

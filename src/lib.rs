@@ -65,7 +65,7 @@ pub use tfe_runtime as runtime;
 /// The elements by name, with the number of nodes as a const parameter: `Mixed::<4>`, `Radau::<3>`, …
 pub use tfe_runtime::element::markers::*;
 pub use tfe_runtime::{
-    Element, Family, Model, Rule, Solve, State, Statistics, StepError, Structure,
+    Element, Family, Model, ModelError, Rule, Solve, State, Statistics, StepError, Structure,
 };
 pub use velocity::Velocity;
 pub use work_precision::WorkPrecision;

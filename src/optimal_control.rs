@@ -316,6 +316,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
     }
 
     fn check(&self) -> Result<(), OptimalControlErrorKind> {
+        (self.model.check()).map_err(OptimalControlErrorKind::Model)?;
         check_span(&self.span)?;
         if self.span.end < self.span.start {
             return Err(OptimalControlErrorKind::Backwards);

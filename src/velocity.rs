@@ -10,8 +10,9 @@ pub trait Velocity<const N: usize, L: Length<N> = FixedLength>: Evaluate<N, L> {
     /// The velocity dq/dt of a state at the time t: the v with ∂L/∂v = p, or ∂H/∂p.
     ///
     /// If the mass matrix is singular, it is the velocity that the constraints determine (theory.md (T-74)). It is NaN
-    /// if they do not determine it, if the iteration for v of a kinetic energy that is not quadratic fails, or (with
-    /// the length of the state) if the lengths of state and model differ.
+    /// if they do not determine it, if the iteration for v of a kinetic energy that is not quadratic fails, if the model
+    /// does not pass its [check](tfe_runtime::Model::check), or (with the length of the state) if the lengths of state
+    /// and model differ.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -39,8 +40,9 @@ pub trait Velocity<const N: usize, L: Length<N> = FixedLength>: Evaluate<N, L> {
 
 impl<M: Model<N>, const N: usize> Velocity<N> for M {
     fn velocity(&self, t: f64, state: &State<N>) -> [f64; N] {
-        let found = Evaluate::velocity(self, t, state, &[0.0; N]);
-        found.unwrap_or([f64::NAN; N])
+        let fits = self.check().is_ok();
+        let found = fits.then(|| Evaluate::velocity(self, t, state, &[0.0; N]));
+        found.flatten().unwrap_or([f64::NAN; N])
     }
 }
 

@@ -1,12 +1,14 @@
 //! Why an assembled problem has no solution.
 
 use std::fmt;
-use tfe_runtime::{ElementError, LegendreError, StepError};
+use tfe_runtime::{ElementError, LegendreError, ModelError, StepError};
 
 /// Why the assembled equations of a boundary-value problem, periodic orbit or similar have no solution.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum AssemblyError {
+    /// The model does not pass its [check](crate::Model::check).
+    Model(ModelError),
     /// The time element does not exist.
     Element(ElementError),
     /// The equations of an element could not be linearised.
@@ -53,6 +55,7 @@ pub enum AssemblyError {
 impl fmt::Display for AssemblyError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
+            Self::Model(error) => error.fmt(f),
             Self::Element(error) => error.fmt(f),
             Self::Linearise {
                 element,
@@ -91,6 +94,7 @@ impl fmt::Display for AssemblyError {
 impl std::error::Error for AssemblyError {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
+            Self::Model(error) => Some(error),
             Self::Element(error) => Some(error),
             Self::Linearise { source, .. } => Some(source),
             Self::Legendre(error) => Some(error),

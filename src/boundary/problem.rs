@@ -276,7 +276,8 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     /// reported as [`AssemblyError::Singular`].
     ///
     /// # Errors
-    /// [`BoundaryError`] if the conditions or the mesh are invalid, or if no solution is found from the guess.
+    /// [`BoundaryError`] if the model does not pass its check, the conditions or the mesh are invalid, or no solution is
+    /// found from the guess.
     pub fn solve(&self) -> Result<BoundaryMotion<'m, M, N>, BoundaryError> {
         self.check()?;
         let mut problem = self.problem()?;
@@ -331,6 +332,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     }
 
     fn check(&self) -> Result<(), BoundaryError> {
+        self.model.check().map_err(AssemblyError::Model)?;
         check_span(&self.span)?;
         if self.conditions.len() != 2 * N {
             return Err(BoundaryError::Count {

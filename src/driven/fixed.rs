@@ -4,7 +4,7 @@ use super::Driven;
 use std::array;
 use tfe_runtime::{
     By, Constraint, ConstraintSecond, Controlled, CoordinateName, Facts, First, Form, InputFailure,
-    InputPanicked, MAX_INPUTS, Model, Real, Second,
+    InputPanicked, MAX_INPUTS, Model, ModelError, Real, Second,
 };
 
 /// The time step of difference quotients along the rates of the inputs. Within it, an input moves by that fraction of
@@ -35,6 +35,10 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         time_dependent: true,
         ..M::FACTS
     };
+
+    fn check(&self) -> Result<(), ModelError> {
+        self.model.check()
+    }
 
     fn energy_function<R: Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
         self.model

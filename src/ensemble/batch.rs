@@ -211,7 +211,7 @@ impl<'m, M: Model<N> + Sync, const N: usize, T> Stepped<'m, M, N, T> {
                         count: starts.len(),
                     }))
                 }
-                Err(error) => Self::Failed(RunErrorKind::Element(error)),
+                Err(error) => Self::Failed(RunErrorKind::of_stepper(error)),
             };
         }
         let Some(&start) = starts.first() else {

@@ -4,7 +4,7 @@ use super::error::EnsembleError;
 use super::plan::{WIDTH, start_of};
 use tfe_runtime::bundle::{Bundle, One, Trajectories, Varied};
 use tfe_runtime::step::Control;
-use tfe_runtime::{Element, ElementError, Model, State};
+use tfe_runtime::{Element, Model, ModelError, State};
 
 /// The models of an ensemble, of either kind of length; internal.
 pub trait Models<'m, M>: Copy + Sync + 'm {
@@ -23,18 +23,19 @@ pub trait Members<'m, M: Model<N>, const N: usize>: Models<'m, M> {
     /// The type that advances eight trajectories side by side.
     type Lanes: Trajectories<'m, M, N> + Send + Sync + 'm;
 
-    /// Whether the models permit runs side by side.
+    /// Whether the models permit runs side by side. Models that do not pass their check do not: each of their runs has an
+    /// error of its own.
     fn share_kernels(&self) -> bool;
 
     /// Creates an empty bundle of trajectories.
     ///
     /// # Errors
-    /// [`ElementError`] if the element does not exist.
+    /// [`ModelError`] if the element does not exist.
     fn bundle(
         &self,
         element: Element,
         control: Control,
-    ) -> Result<Bundle<'m, M, N, WIDTH, Self::Lanes>, ElementError>;
+    ) -> Result<Bundle<'m, M, N, WIDTH, Self::Lanes>, ModelError>;
 
     /// Puts the runs from `first` on into the bundle, one per lane.
     fn place(
@@ -98,14 +99,14 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for OneModel<'m, 
     type Lanes = One<'m, M>;
 
     fn share_kernels(&self) -> bool {
-        true
+        self.0.check().is_ok()
     }
 
     fn bundle(
         &self,
         element: Element,
         control: Control,
-    ) -> Result<Bundle<'m, M, N, WIDTH, One<'m, M>>, ElementError> {
+    ) -> Result<Bundle<'m, M, N, WIDTH, One<'m, M>>, ModelError> {
         Bundle::new(self.0, element, control)
     }
 
@@ -129,7 +130,8 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m
         self.0.first().is_some_and(|first| {
             let beside = unnumbered(first);
             let share = |model: &M| first.shares_inputs(model) && unnumbered(model) == beside;
-            first.parameters() > 0 && self.0.iter().all(share)
+            let is_good = |model: &M| model.check().is_ok();
+            first.parameters() > 0 && self.0.iter().all(share) && self.0.iter().all(is_good)
         })
     }
 
@@ -137,7 +139,7 @@ impl<'m, M: Model<N> + Sync, const N: usize> Members<'m, M, N> for ManyModels<'m
         &self,
         element: Element,
         control: Control,
-    ) -> Result<Bundle<'m, M, N, WIDTH, Varied<'m, M>>, ElementError> {
+    ) -> Result<Bundle<'m, M, N, WIDTH, Varied<'m, M>>, ModelError> {
         Bundle::of_models(self.model(0), element, control)
     }
 

@@ -43,6 +43,7 @@ impl<const N: usize> Plan<N> {
         model: &M,
         start: &State<N>,
     ) -> Result<Node<N>, RunErrorKind> {
+        model.check().map_err(RunErrorKind::Family)?;
         check_start(start)?;
         Ok(self.node(model, start))
     }
@@ -121,11 +122,12 @@ impl<const N: usize> Plan<N> {
     where
         M: Model<N>,
     {
+        model.check().map_err(RunErrorKind::Family)?;
         check_start(start)?;
         if let Some((t, _, h)) = self.mesh.elements().next() {
             check_constraints(model, t, h, start)?;
         }
-        Stepper::new(model, self.element, self.control).map_err(RunErrorKind::Element)
+        Stepper::new(model, self.element, self.control).map_err(RunErrorKind::of_stepper)
     }
 
     /// Advances one run from its current state.

@@ -237,7 +237,8 @@ where
     ///
     /// # Errors
     /// [`EnsembleError`] if nothing can run: the element does not exist, the step size or the span is not finite, or
-    /// the number of starts does not fit the number of models. An invalid start fails its own run only.
+    /// the number of starts does not fit the number of models. An invalid start, or a model that does not pass its
+    /// [check](Model::check), fails its own run only.
     pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
         let count = self.models.count(starts.len())?;
         let results = Mutex::new(Results::new(count));
@@ -310,7 +311,7 @@ where
         } else if plan.width == WIDTH {
             // Created once; one batch after the other runs in a copy.
             let empty = self.models.bundle(self.element, self.control);
-            let empty = empty.map_err(RunErrorKind::Element)?;
+            let empty = empty.map_err(RunErrorKind::of_stepper)?;
             let batch = |bundle: &mut Bundle<'m, M, N, WIDTH, K::Lanes>, number: usize| {
                 let from = number * WIDTH;
                 let starts = some_starts(starts, from, count);

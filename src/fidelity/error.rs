@@ -30,7 +30,7 @@ pub enum FidelityError {
         /// The outputs that it declares.
         declared: Vec<String>,
     },
-    /// The lengths of a model of run-time length do not fit each other.
+    /// A model does not pass its [check](crate::Model::check): lengths or indices do not fit each other.
     Model {
         /// The rung.
         rung: String,

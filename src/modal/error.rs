@@ -38,7 +38,7 @@ pub enum ModalError {
     },
     /// The iteration for eigenvalues did not converge.
     NoEigenvalues,
-    /// The lengths of a model of run-time length do not fit each other.
+    /// The model does not pass its [check](crate::Model::check): lengths or indices do not fit each other.
     Family(family::ModelError),
 }
 

@@ -58,6 +58,7 @@ impl<M: Model<N>, const N: usize> Reducible<State<N>> for M {
     const DECLARED: Form = M::FORM;
 
     fn quadratic(&self) -> Result<Quadratic, ModalError> {
+        self.check().map_err(ModalError::Family)?;
         admitted(M::FACTS, !M::CONSTRAINTS.is_empty())?;
         let (mut first, mut second) = (First::<f64, N>::ZERO, Second::<f64, N>::ZERO);
         let zero = [0.0; N];

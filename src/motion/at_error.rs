@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::fmt;
+use tfe_runtime::ModelError;
 
 /// Why a motion cannot be evaluated at a time, or an output of it be integrated.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +34,8 @@ pub enum AtError {
         /// The time.
         time: f64,
     },
+    /// The model does not pass its [check](crate::Model::check).
+    Model(ModelError),
 }
 
 impl fmt::Display for AtError {
@@ -62,8 +65,16 @@ impl fmt::Display for AtError {
                     "no velocity belongs to the momentum at t = {time}: is the mass matrix singular there?"
                 )
             }
+            Self::Model(error) => error.fmt(f),
         }
     }
 }
 
-impl Error for AtError {}
+impl Error for AtError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Model(error) => Some(error),
+            _ => None,
+        }
+    }
+}

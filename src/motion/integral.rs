@@ -41,11 +41,13 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     ///
     /// # Errors
     /// [`AtError::NoOutput`] if the model declares no such output, [`AtError::NotRecorded`] if `record_every` left out
-    /// elements, [`AtError::NoVelocity`] if no velocity belongs to a momentum.
+    /// elements, [`AtError::NoVelocity`] if no velocity belongs to a momentum, [`AtError::Model`] if the model does not
+    /// pass its check.
     pub fn integral<M>(&self, model: &M, output: &str) -> Result<Vec<f64>, AtError>
     where
         M: Evaluate<N, L>,
     {
+        model.checked().map_err(AtError::Model)?;
         let names: Vec<String> = (model.output_names().iter())
             .map(ToString::to_string)
             .collect();

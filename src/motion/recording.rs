@@ -9,11 +9,14 @@ use crate::numbers::larger;
 use tfe_runtime::{CoordinateName, Statistics};
 
 impl<const N: usize, L: Length<N>> Motion<N, L> {
-    /// A motion that consists of its start.
+    /// A motion that consists of its start; of a model that does not pass its check nothing but the start is known.
     pub(crate) fn from_start<M>(model: &M, t: f64, start: &L::State) -> Self
     where
         M: Evaluate<N, L>,
     {
+        if model.checked().is_err() {
+            return Self::unasked(t, start);
+        }
         let (_, p) = L::parts(start);
         let node = Node::new(model, t, start, &L::zero(p));
         Self::starting(model, node)
@@ -49,7 +52,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         motion
     }
 
-    /// The start of a run that never began. The model is not evaluated, since its lengths may be inconsistent.
+    /// The start of a run that never began. The model is not evaluated, since its lengths or indices may not fit.
     pub(crate) fn unasked(t: f64, start: &L::State) -> Self {
         let (_, p) = L::parts(start);
         let nodes = vec![Node::of(t, start, L::unknown(p))];

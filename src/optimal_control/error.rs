@@ -5,7 +5,7 @@ use crate::boundary::BoundaryError;
 use crate::driven::InputError;
 use std::error::Error;
 use std::fmt;
-use tfe_runtime::{ElementError, LegendreError};
+use tfe_runtime::{ElementError, LegendreError, ModelError};
 
 /// Why no inputs of least cost were found, and the iterate at which the search ended.
 #[derive(Clone)]
@@ -48,6 +48,8 @@ pub enum OptimalControlErrorKind {
     Ends(BoundaryError),
     /// The span goes backwards in time, so that integrals of costs would have the opposite sign.
     Backwards,
+    /// The model does not pass its [check](crate::Model::check).
+    Model(ModelError),
     /// The element does not exist.
     Element(ElementError),
     /// The model has constraints, which are not supported here.
@@ -173,6 +175,7 @@ impl fmt::Display for OptimalControlErrorKind {
             Self::Backwards => {
                 f.write_str("the span goes backwards: costs are counted forwards in time")
             }
+            Self::Model(error) => error.fmt(f),
             Self::Element(error) => error.fmt(f),
             Self::Constrained { constraint } => write!(
                 f,
@@ -251,6 +254,7 @@ impl Error for OptimalControlErrorKind {
     fn source(&self) -> Option<&(dyn Error + 'static)> {
         match self {
             Self::Ends(error) => Some(error),
+            Self::Model(error) => Some(error),
             Self::Element(error) => Some(error),
             Self::Input(error) => Some(error),
             Self::Legendre(error) => Some(error),

@@ -258,7 +258,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// Finds the orbit and its Floquet multipliers.
     ///
     /// # Errors
-    /// [`OrbitError`] if a setting is invalid, or if no orbit is found from the guess.
+    /// [`OrbitError`] if the model does not pass its check, a setting is invalid, or no orbit is found from the guess.
     pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
         let (problem, iterate, assembly) = self.solved()?;
         Orbit::new(self.element, &problem, iterate, &assembly)
@@ -266,6 +266,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 
     /// Solves the equations.
     pub(crate) fn solved(&self) -> Result<Solved<'m, M, N>, OrbitError> {
+        self.model.check().map_err(AssemblyError::Model)?;
         let period = self.period.checked()?;
         self.check_numbers()?;
         let autonomous = !M::FACTS.time_dependent;

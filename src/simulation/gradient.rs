@@ -227,7 +227,7 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
             model: &*run.model,
             mesh,
             elements,
-            stepper: stepper.map_err(RunErrorKind::Element)?,
+            stepper: stepper.map_err(RunErrorKind::of_stepper)?,
             by_parameters: vec![0.0; parameters.len()],
             parameters,
             pull: Pull::new(&*run.model),

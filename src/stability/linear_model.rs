@@ -11,7 +11,8 @@ use nalgebra::DMatrix;
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::{
-    CoordinateName, Element, Facts, First, Form, Model, Real, Second, State, legendre, transition,
+    CoordinateName, Element, Facts, First, Form, Model, ModelError, Real, Second, State, legendre,
+    transition,
 };
 
 /// Why a model cannot be linearised about a state.
@@ -24,6 +25,8 @@ pub enum LinearModelError {
     NoVelocity,
     /// A second derivative is infinite or not a number.
     NotFinite,
+    /// The model does not pass its [check](Model::check).
+    Model(ModelError),
 }
 
 impl fmt::Display for LinearModelError {
@@ -36,11 +39,19 @@ impl fmt::Display for LinearModelError {
                 "no velocity belongs to the momentum of the state: is the mass matrix singular there?"
             }
             Self::NotFinite => "a second derivative of the model is not finite at the state",
+            Self::Model(error) => return error.fmt(f),
         })
     }
 }
 
-impl Error for LinearModelError {}
+impl Error for LinearModelError {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        match self {
+            Self::Model(error) => Some(error),
+            _ => None,
+        }
+    }
+}
 
 /// A model linearised about a state, with its second derivatives held at their values there:
 ///
@@ -84,7 +95,8 @@ impl<const N: usize> LinearModel<N> {
     /// Linearises a model about `state` at a given time.
     ///
     /// # Errors
-    /// [`LinearModelError`] for a model with constraints, a singular mass matrix, or derivatives that are not finite.
+    /// [`LinearModelError`] for a model with constraints or one that does not pass its check, a singular mass matrix, or
+    /// derivatives that are not finite.
     pub fn about<M: Model<N>>(
         model: &M,
         t: f64,
@@ -93,6 +105,7 @@ impl<const N: usize> LinearModel<N> {
         if const { !M::CONSTRAINTS.is_empty() } {
             return Err(LinearModelError::Constrained);
         }
+        model.check().map_err(LinearModelError::Model)?;
         let view = legendre::hamiltonian_view(model, t, &state.q, &state.p)
             .map_err(|_| LinearModelError::NoVelocity)?;
         Self::of(view.second)

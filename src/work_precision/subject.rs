@@ -150,7 +150,7 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
         // The inside of elements is not needed, so that linear models may step by a matrix.
         stepper
             .map(Stepper::ends_only)
-            .map_err(RunErrorKind::Element)
+            .map_err(RunErrorKind::of_stepper)
     }
 
     #[inline]
@@ -200,6 +200,7 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
     }
 
     fn output_names(&self) -> Result<Vec<String>, RunErrorKind> {
+        self.check().map_err(RunErrorKind::Family)?;
         let columns = 0..self.columns();
         Ok(columns.map(|at| self.column_name(at).to_string()).collect())
     }
@@ -221,9 +222,11 @@ impl<M: Model<N>, const N: usize> Steppable<State<N>> for M {
     fn check_start(&self, start: &State<N>, over: Range<f64>, h: f64) -> Result<(), RunErrorKind> {
         let run = Simulation::new(self).step(h).run(*start, over);
         match run.as_ref().map_err(RunError::kind) {
-            Err(kind @ (RunErrorKind::Start { .. } | RunErrorKind::Inconsistent { .. })) => {
-                Err(kind.clone())
-            }
+            Err(
+                kind @ (RunErrorKind::Family(_)
+                | RunErrorKind::Start { .. }
+                | RunErrorKind::Inconsistent { .. }),
+            ) => Err(kind.clone()),
             // Only the checks before the step matter.
             _ => Ok(()),
         }

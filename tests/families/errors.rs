@@ -28,10 +28,10 @@ fn coupled(n: usize, w: usize, m: usize, k: usize) -> Coupled {
 
 #[track_caller]
 fn check(model: &Coupled, expected: family::ModelError, message: &str) {
-    assert_eq!(model.check(), Err(expected.clone()));
+    assert_eq!(model.check(), Err(expected));
     assert_eq!(expected.to_string(), message);
     let (q, v) = (vec![0.0; model.n + model.w], vec![0.0; model.n + model.w]);
-    assert_eq!(momenta(model, 0.0, &q, &v), Err(expected.clone()));
+    assert_eq!(momenta(model, 0.0, &q, &v), Err(expected));
     let start = FamilyState { q, p: v };
     let error = Simulation::new(model)
         .run(start, 0.0..1.0)

@@ -268,7 +268,7 @@ fn pairs_of_differences_fill_their_diagonal() {
     }
 }
 
-/// With fixed size, and a length that is not checked.
+/// With fixed size, whose kernels check nothing themselves.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - c[m-2]*x^2/2)]
 struct LastButOne {
     m: usize,

@@ -63,7 +63,7 @@ pub(crate) struct Emitter<'a> {
     reads: SortedMap<Temporary, usize>,
     /// The indices of all loops.
     indices: SortedSet<String>,
-    /// Those of them whose turns depend on fields that nothing has checked, as in models of fixed size.
+    /// Those of them whose turns depend on fields of models of fixed size.
     unchecked: SortedSet<LoopVariable>,
     names: SortedMap<Temporary, Ident>,
     taken: SortedSet<String>,
@@ -306,7 +306,8 @@ impl<'a> Emitter<'a> {
         }
     }
 
-    /// Whether an index depends on fields that nothing has checked: those of models of run-time length are checked before a run.
+    /// Whether an index depends on fields that may not have been checked: kernels of models of fixed size may be called
+    /// directly.
     fn is_unchecked(&self, index: &Affine) -> bool {
         let varies = || self.unchecked.iter().any(|own| index.depends_on(*own));
         !self.by_entries && (index.is_of_run_time() || index.holds_entry() || varies())

@@ -12,7 +12,7 @@ use crate::lengths::Lengths;
 use crate::page::{self, Formulas};
 use crate::parameters::Parameters;
 use crate::source_map::SourceMap;
-use crate::{constraint, fallback, family, input, solver, state, variant};
+use crate::{checks, constraint, fallback, family, input, solver, state, variant};
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::quote;
 use syn::ItemStruct;
@@ -391,6 +391,7 @@ impl<'a> Kernels<'a> {
                 (self.without_inputs(lanes), controlled)
             }
         };
+        let check = checks::member(self.declared);
         let of_deprecated = input::of_deprecated(item);
         quote! {
             #of_deprecated
@@ -405,6 +406,8 @@ impl<'a> Kernels<'a> {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
                     #ignorable
+
+                    #check
 
                     #kernels
 
@@ -550,18 +553,21 @@ impl<'a> Kernels<'a> {
             Some(_) => quote!(tau),
         };
         let count = Literal::usize_unsuffixed(self.declared.observables.len());
+        let unknown = quote!(return ::core::primitive::f64::NAN;);
+        let (guard, remark) = checks::guard(self.declared, path, &unknown);
         let observables = self.declared.observables.iter().enumerate().map(|(k, Observable { name, .. })| {
             let (method, k) = (indices::identifier(name), Literal::usize_unsuffixed(k));
             let inputs = match self.declared.inputs.is_empty() {
                 true => "",
                 false => "; all inputs are zero",
             };
-            let doc = format!(" The observable `{name}` at time `{time}`, coordinates `q` and {second_doc} `{second}`{inputs}.");
+            let doc = format!(" The observable `{name}` at time `{time}`, coordinates `q` and {second_doc} `{second}`{inputs}{remark}.");
             let own = docs.attributes("output", name);
             quote! {
                 #own
                 #[doc = #doc]
                 #vis fn #method(&self, #time: f64, q: [f64; #dof], #second: [f64; #dof]) -> f64 {
+                    #guard
                     let mut values = [0.0; #count];
                     #path::__private::Model::observables(self, #time, &q, &#second, &mut values);
                     values[#k]

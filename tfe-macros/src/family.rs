@@ -1,4 +1,4 @@
-//! Models of run-time length: kernels over slices, and the checks of lengths.
+//! Models of run-time length: kernels over slices.
 
 mod constraint;
 mod observable;
@@ -6,6 +6,7 @@ mod sites;
 pub(crate) mod strides;
 mod zero;
 
+use crate::checks;
 use crate::controls::{self, Controls};
 use crate::docs::Docs;
 use crate::emit::{Body, Emitter};
@@ -19,9 +20,8 @@ use quote::quote;
 use strides::Strides;
 use syn::ItemStruct;
 use tfe_symbolic::derive::derivation::Derivation;
-use tfe_symbolic::expr::input::{Affine, IndexSymbol};
-use tfe_symbolic::expr::ordered::SortedMap;
-use tfe_symbolic::model::declared::{Declared, Extent, Form, Requirement};
+use tfe_symbolic::expr::input::Affine;
+use tfe_symbolic::model::declared::{Declared, Form};
 use tfe_symbolic::program::{Program, Request};
 
 /// `impl FamilyModel for Name`, and the methods.
@@ -249,7 +249,7 @@ impl Kernels<'_> {
         };
         let facts = page::facts(self.derivation, &quote!(__tfe));
         let momenta_move = self.derivation.momenta_move();
-        let (dof, check) = (&self.dof, self.check());
+        let (dof, check) = (&self.dof, checks::statements(self.declared));
         let coordinate_name = self.coordinate_name();
         let (observable_names, observables) = self.observables().unzip();
         let parameters = self.parameters.members();
@@ -380,123 +380,6 @@ impl Kernels<'_> {
                 #controlled
             };
         }
-    }
-
-    /// The fields that appear in lengths, ranges and indices, each once.
-    fn length_fields(&self) -> Vec<&str> {
-        let mut affines: Vec<&Affine> = Vec::new();
-        let coordinates = self.declared.coordinates.iter();
-        affines.extend(coordinates.filter_map(|array| array.length.as_ref()));
-        for requirement in &self.declared.requirements {
-            match requirement {
-                Requirement::FieldLength { length, .. } => affines.push(length),
-                Requirement::Turns { start, end, .. } => affines.extend([start, end]),
-                Requirement::Index {
-                    nest,
-                    place,
-                    length,
-                    ..
-                } => {
-                    affines.extend(nest.iter().flat_map(|range| [&range.start, &range.end]));
-                    affines.push(place);
-                    if let Extent::Known(length) = length {
-                        affines.push(length);
-                    }
-                }
-            }
-        }
-        let mut fields: Vec<&str> = Vec::new();
-        while let Some(affine) = affines.pop() {
-            for (symbol, _) in &affine.terms {
-                match symbol {
-                    IndexSymbol::Field(name) if !fields.contains(&name.as_str()) => {
-                        fields.push(name);
-                    }
-                    IndexSymbol::Entry(_, place) => affines.push(place),
-                    _ => {}
-                }
-            }
-        }
-        fields.sort_unstable();
-        fields
-    }
-
-    /// The statements of `check`.
-    fn check(&self) -> TokenStream {
-        // First, so that later checks do not overflow.
-        let longest = self.length_fields().into_iter().map(|name| {
-            let field = indices::identifier(name);
-            quote!(__tfe::checks::length(#name, self.#field)?;)
-        });
-        let elements = self.declared.coordinates.iter().filter_map(|array| {
-            let length = array
-                .length
-                .as_ref()
-                .filter(|length| length.is_of_run_time())?;
-            let name = format!("{}[{length}]", array.name);
-            let length = indices::index(length);
-            Some(quote!(__tfe::checks::elements(#name, #length)?;))
-        });
-        let mut lengths: SortedMap<&str, Vec<TokenStream>> = SortedMap::new();
-        let mut rest = Vec::new();
-        for requirement in &self.declared.requirements {
-            match requirement {
-                Requirement::FieldLength {
-                    field,
-                    text,
-                    ranges,
-                    length,
-                } => {
-                    let length = indices::signed(length);
-                    let one = quote!((#length, #text, #ranges));
-                    lengths.get_or_default(field).push(one);
-                }
-                Requirement::Turns { ranges, start, end } => {
-                    let (start, end) = (indices::signed(start), indices::signed(end));
-                    rest.push(quote!(__tfe::checks::turns(#ranges, #start, #end)?;));
-                }
-                Requirement::Index {
-                    array,
-                    text,
-                    ranges,
-                    nest,
-                    place,
-                    length,
-                } => {
-                    let entries: Vec<(&str, &Affine)> = place.entries().collect();
-                    let value = indices::signed(place);
-                    let length = match length {
-                        Extent::Known(length) => indices::index(length),
-                        Extent::OfField(field) => {
-                            let field = indices::identifier(field);
-                            quote!(self.#field.len())
-                        }
-                    };
-                    let index = quote!((#array, #text, #ranges));
-                    let one = match entries[..] {
-                        // For a single entry the message names the list and the place.
-                        [(list, at)] => {
-                            let (field, at) = (indices::identifier(list), indices::index(at));
-                            let entry = quote!((#list, &self.#field, #at));
-                            quote!(__tfe::checks::entry(#index, #entry, #value, #length)?;)
-                        }
-                        _ => quote!(__tfe::checks::index(#index, #value, #length)?;),
-                    };
-                    let nested = nest.iter().rev().fold(one, |inner, range| {
-                        let variable = indices::loop_name(range.variable);
-                        let (start, end) =
-                            (indices::index(&range.start), indices::index(&range.end));
-                        quote!(for #variable in #start..#end { #inner })
-                    });
-                    rest.push(nested);
-                }
-            }
-        }
-        let lengths = lengths.iter().map(|(name, uses)| {
-            let field = indices::identifier(name);
-            quote!(__tfe::checks::field_length(#name, self.#field.len(), &[#(#uses),*])?;)
-        });
-        quote!(#(#longest)* #(#elements)* #(#lengths)* #(#rest)*)
     }
 
     fn coordinate_name(&self) -> TokenStream {

@@ -16,7 +16,9 @@ pub(crate) struct Lengths {
 
 impl Lengths {
     pub(crate) fn of(declared: &Declared, item: &ItemStruct) -> Self {
-        let checks: Vec<TokenStream> = declared.requirements.iter().filter_map(check).collect();
+        let requirements = declared.requirements.iter();
+        let requirements = requirements.filter(|one| one.is_of_const_parameters());
+        let checks: Vec<TokenStream> = requirements.filter_map(check).collect();
         if checks.is_empty() {
             return Self {
                 constant: TokenStream::new(),

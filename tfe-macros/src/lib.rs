@@ -4,6 +4,7 @@
 //! model, and `expand` writes the resulting programs as Rust. The language is described in the documentation of `tfe`.
 
 mod balance;
+mod checks;
 mod constraint;
 mod controls;
 mod docs;

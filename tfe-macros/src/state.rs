@@ -1,5 +1,6 @@
 //! The methods that make states: `state`, and `state_at` of models with a time transformation.
 
+use crate::checks;
 use crate::emit::Emitter;
 use crate::indices::index;
 use proc_macro2::{Literal, TokenStream};
@@ -19,6 +20,11 @@ pub(crate) fn methods(declared: &Declared, vis: &TokenStream, path: &TokenStream
         let statements = body.statements;
         let dof = index(&declared.dof);
         let clock = Literal::usize_unsuffixed(clock);
+        let unknown = quote! {
+            state.p[#clock] = ::core::primitive::f64::NAN;
+            return state;
+        };
+        let (guard, _) = checks::guard(declared, path, &unknown);
         return quote! {
             /// The state with coordinates `q` and momenta `p` at the time t = 0 of the model: t and p_t = −H(q, p, t) come last.
             #vis fn state(&self, q: [f64; #clock], p: [f64; #clock]) -> #path::__private::State<#dof> {
@@ -30,6 +36,7 @@ pub(crate) fn methods(declared: &Declared, vis: &TokenStream, path: &TokenStream
                 let mut state = #path::__private::State { q: [t; #dof], p: [0.0; #dof] };
                 state.q[..#clock].copy_from_slice(&q);
                 state.p[..#clock].copy_from_slice(&p);
+                #guard
                 state.p[#clock] = -self.__tfe_hamiltonian(t, &state.q, &state.p);
                 state
             }

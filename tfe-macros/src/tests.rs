@@ -1,5 +1,6 @@
 //! Golden expansions: what `#[dynamics]` writes for a few models, as readable Rust. `UPDATE_GOLDEN=1 cargo test -p tfe-macros` rewrites them.
 
+mod checks;
 mod mistakes;
 
 use crate::expand::expand;

@@ -21,7 +21,8 @@ mod together;
 mod trajectories;
 mod varied;
 
-use crate::element::{Element, ElementError};
+use crate::consistency::ModelError;
+use crate::element::Element;
 use crate::error::StepError;
 use crate::legendre::largest;
 use crate::model::{Model, State};
@@ -166,8 +167,8 @@ where
     /// An empty bundle.
     ///
     /// # Errors
-    /// [`ElementError`] if the element is invalid.
-    pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
+    /// [`ModelError`] if the model does not pass its [check](Model::check), or the element is invalid.
+    pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ModelError> {
         Self::with(One(model), element, control)
     }
 
@@ -185,12 +186,8 @@ where
     /// [else](Model::unnumbered); all lanes begin with this one.
     ///
     /// # Errors
-    /// [`ElementError`] if the element is invalid.
-    pub fn of_models(
-        model: &'m M,
-        element: Element,
-        control: Control,
-    ) -> Result<Self, ElementError> {
+    /// [`ModelError`] if the model does not pass its [check](Model::check), or the element is invalid.
+    pub fn of_models(model: &'m M, element: Element, control: Control) -> Result<Self, ModelError> {
         Self::with(Varied::new(model), element, control)
     }
 
@@ -206,7 +203,8 @@ where
     M: Model<N>,
     T: Trajectories<'m, M, N>,
 {
-    fn with(models: T, element: Element, control: Control) -> Result<Self, ElementError> {
+    fn with(models: T, element: Element, control: Control) -> Result<Self, ModelError> {
+        models.model(0).check()?;
         let table = SchemeTable::new(element)?;
         let engine = if Self::uses_lanes(&element, &control) {
             Engine::new(models.kernels(), &table)

@@ -1,5 +1,6 @@
 //! Why a step failed.
 
+use crate::consistency::ModelError;
 use crate::element::{Element, ElementError};
 use crate::model::CoordinateName;
 use core::fmt;
@@ -158,6 +159,9 @@ pub enum StepError {
     },
     /// A value of the model, or a component of the state, is not finite.
     NonFinite,
+    /// An index made of fields is outside its array, or a vector has another length than its indices require:
+    /// [`Model::check`](crate::Model::check) says which.
+    Inconsistent,
     /// The matrix of Newton's method is singular.
     SingularTangent {
         /// The unknown at which elimination stopped.
@@ -234,6 +238,9 @@ impl fmt::Display for StepError {
                 )
             }
             Self::NonFinite => f.write_str("a value of the model or of the state is not finite"),
+            Self::Inconsistent => f.write_str(
+                "an index or the length of a vector does not fit the model: its `check` says which",
+            ),
             Self::SingularTangent { unknown } => {
                 write!(f, "the tangent matrix is singular at unknown {unknown}")
             }
@@ -315,6 +322,15 @@ pub enum TransitionError {
 impl From<ElementError> for TransitionError {
     fn from(error: ElementError) -> Self {
         Self::Element(error)
+    }
+}
+
+impl From<ModelError> for TransitionError {
+    fn from(error: ModelError) -> Self {
+        match error {
+            ModelError::Element(error) => Self::Element(error),
+            _ => Self::Step(StepError::Inconsistent),
+        }
     }
 }
 

@@ -12,7 +12,6 @@ mod backwards;
 mod blocked;
 mod controlled;
 mod dense;
-mod error;
 mod forces;
 #[cfg(feature = "sparse")]
 mod held;
@@ -55,7 +54,6 @@ mod view;
 pub use backwards::Backwards;
 pub use controlled::Controlled;
 pub use dense::DenseElement;
-pub use error::ModelError;
 #[cfg(feature = "sparse")]
 pub use kick::Kick;
 pub use model::{Block, Entries, FamilyState, Gradient, Model, STRIDE, Sweep};
@@ -64,6 +62,7 @@ pub use stepper::{Stepper, Suspended};
 #[cfg(feature = "sparse")]
 pub use transition::{OperatorError, TransitionOperator};
 
+pub use crate::consistency::ModelError;
 #[cfg(feature = "std")]
 use crate::enclosure::Enclosure;
 use crate::legendre::largest;
@@ -292,120 +291,4 @@ pub fn observables<M: Model>(
     model.observables(t, q, z, &mut values);
     let (first, count) = place();
     Ok(values.into_iter().skip(first).take(count).collect())
-}
-
-/// Checks of lengths, indices and ranges, which generated code calls.
-#[doc(hidden)]
-pub mod checks {
-    use super::ModelError;
-
-    /// Longer than any array, and small enough that sums of several such lengths do not overflow.
-    const LONGEST: i64 = 1 << 40;
-
-    /// Checks that an array may have this length.
-    ///
-    /// # Errors
-    /// [`ModelError::Length`].
-    pub fn length(field: &'static str, length: usize) -> Result<(), ModelError> {
-        if i64::try_from(length).is_ok_and(|length| length <= LONGEST) {
-            return Ok(());
-        }
-        Err(ModelError::Length { field, length })
-    }
-
-    /// Checks that an array of coordinates is not empty.
-    ///
-    /// # Errors
-    /// [`ModelError::NoElements`].
-    pub fn elements(array: &'static str, length: usize) -> Result<(), ModelError> {
-        if length == 0 {
-            return Err(ModelError::NoElements { array });
-        }
-        Ok(())
-    }
-
-    /// Checks that a range is not empty.
-    ///
-    /// # Errors
-    /// [`ModelError::EmptyRange`].
-    pub fn turns(ranges: &'static str, start: i64, end: i64) -> Result<(), ModelError> {
-        if start >= end {
-            return Err(ModelError::EmptyRange { ranges, start, end });
-        }
-        Ok(())
-    }
-
-    /// Checks that an index is within its array.
-    ///
-    /// # Errors
-    /// [`ModelError::Index`].
-    pub fn index(
-        (array, index, ranges): (&'static str, &'static str, &'static str),
-        value: i64,
-        length: usize,
-    ) -> Result<(), ModelError> {
-        if usize::try_from(value).is_ok_and(|value| value < length) {
-            return Ok(());
-        }
-        Err(ModelError::Index {
-            array,
-            index,
-            ranges,
-            value,
-            length,
-        })
-    }
-
-    /// Checks that an index computed from an entry of a list (its name, the list, the place) is within its array.
-    ///
-    /// # Errors
-    /// [`ModelError::ListEntry`].
-    pub fn entry(
-        (array, index, ranges): (&'static str, &'static str, &'static str),
-        (list, entries, place): (&'static str, &[usize], usize),
-        value: i64,
-        length: usize,
-    ) -> Result<(), ModelError> {
-        if usize::try_from(value).is_ok_and(|value| value < length) {
-            return Ok(());
-        }
-        Err(ModelError::ListEntry {
-            list,
-            place,
-            entry: entries.get(place).copied().unwrap_or(usize::MAX),
-            array,
-            index,
-            ranges,
-            length,
-        })
-    }
-
-    /// An entry of a list as a term of an index; entries larger than any length are limited to that.
-    #[must_use]
-    pub fn small(entry: usize) -> i64 {
-        i64::try_from(entry).map_or(LONGEST, |entry| entry.min(LONGEST))
-    }
-
-    /// Checks that an array field is as long as the largest of its indices requires: (length, index, ranges) of each.
-    ///
-    /// # Errors
-    /// [`ModelError::FieldLength`].
-    pub fn field_length(
-        field: &'static str,
-        length: usize,
-        uses: &[(i64, &'static str, &'static str)],
-    ) -> Result<(), ModelError> {
-        match uses.iter().max_by_key(|(expected, ..)| *expected) {
-            Some((expected, index, ranges)) if usize::try_from(*expected) != Ok(length) => {
-                Err(ModelError::FieldLength {
-                    field,
-                    length,
-                    expected: *expected,
-                    index,
-                    ranges,
-                })
-            }
-            _ => Ok(()),
-        }
-    }
 }

@@ -22,6 +22,7 @@ pub mod bundle;
 mod condense;
 #[cfg(feature = "alloc")]
 pub mod condenser;
+mod consistency;
 pub mod constrained;
 mod constrained_step;
 mod control;
@@ -84,6 +85,7 @@ pub mod weak_form;
 pub mod workspace;
 
 pub use condense::{Direction, Parameter};
+pub use consistency::ModelError;
 pub use controlled::{Controlled, MAX_INPUTS};
 #[cfg(feature = "std")]
 pub use dense::bounds::{Arguments, LongArguments};
@@ -110,6 +112,7 @@ pub use structure::{Operations, Structure};
 /// Items that generated code refers to. Not part of the public interface.
 #[doc(hidden)]
 pub mod __private {
+    pub use crate::consistency::{ModelError, checks};
     pub use crate::controlled::{Controlled, MAX_INPUTS};
     pub use crate::element::markers::*;
     pub use crate::element::{Element, Rule};
@@ -117,7 +120,7 @@ pub mod __private {
     #[cfg(feature = "alloc")]
     pub use crate::family::{
         Block, Controlled as FamilyControlled, Entries, FamilyState, Gradient,
-        Model as FamilyModel, ModelError as FamilyError, STRIDE, Sweep, checks,
+        Model as FamilyModel, ModelError as FamilyError, STRIDE, Sweep,
         observable as family_observable, observables as family_observables,
     };
     pub use crate::length::{Declared, RunTimeLength};
@@ -153,14 +156,18 @@ pub mod __private {
     }
 
     /// The state that belongs to coordinates and velocities. A momentum that does not exist becomes NaN, which the
-    /// first step reports.
+    /// first step reports; so do all momenta of a model that does not pass its check.
     pub fn state<M, const N: usize>(model: &M, t: f64, q: [f64; N], v: [f64; N]) -> State<N>
     where
         M: Model<N>,
     {
-        crate::legendre::state(model, t, &q, &v).unwrap_or(State {
+        let unknown = State {
             q,
             p: [f64::NAN; N],
-        })
+        };
+        match model.check() {
+            Ok(()) => crate::legendre::state(model, t, &q, &v).unwrap_or(unknown),
+            Err(_) => unknown,
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! kernels evaluate that function and its partial derivatives at one instant; everything else
 //! (Legendre transform, elements, Newton) lives in this crate. In the names below **z** stands for the velocity v of a Lagrangian and for the momentum p of a Hamiltonian.
 
+use crate::consistency::ModelError;
 use crate::input::{InputFailure, InputPanicked};
 use crate::real::Real;
 
@@ -246,6 +247,19 @@ pub trait Model<const N: usize> {
         first: &mut First<R, N>,
         second: &mut Second<R, N>,
     );
+
+    /// Checks fields that are lengths, indices or vectors: that every index which the declaration makes of them is inside
+    /// its array, and every vector as long as its largest index requires.
+    ///
+    /// Whatever takes a model and returns an error checks it once. Kernels do not: those of a model that does not pass
+    /// panic, and so may functions of the runtime that evaluate them directly. Models with hand-written kernels need not
+    /// implement it.
+    ///
+    /// # Errors
+    /// [`ModelError`], which names the array, the sum and the index.
+    fn check(&self) -> Result<(), ModelError> {
+        Ok(())
+    }
 
     /// The names of the parameters by which the model can be differentiated: those of `sensitivity(…)`.
     const SENSITIVITIES: &'static [&'static str] = &[];

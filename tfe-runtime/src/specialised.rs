@@ -76,7 +76,11 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
             step,
             steps: 0.0,
             memory: Memory::new(),
-            points: if const { S::GROUPS > 0 } && step.is_finite() && step != 0.0 {
+            points: if const { S::GROUPS > 0 }
+                && step.is_finite()
+                && step != 0.0
+                && model.check().is_ok()
+            {
                 Points::new(model, Tables::new(tables))
             } else {
                 None
@@ -113,7 +117,8 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
     /// although it is not used).
     ///
     /// # Errors
-    /// [`StepError`]; `state` is unchanged then.
+    /// [`StepError`]; `state` is unchanged then. For a model that does not pass its [check](Model::check) that is
+    /// [`StepError::Inconsistent`].
     #[inline]
     pub fn advance<M, const P: usize, const U: usize>(
         &mut self,
@@ -124,6 +129,10 @@ impl<const N: usize, S: Storage, const NUMBERS: usize, const PIVOTS: usize>
     where
         M: Model<N>,
     {
+        // Nothing at all for models whose fields cannot be wrong. A solver is made without an error to tell.
+        if model.check().is_err() {
+            return Err(StepError::Inconsistent);
+        }
         let place = (self.time(), self.step);
         match self.together((model, scheme), place, state) {
             Together::Arrived => {}

@@ -38,7 +38,8 @@ use wanted::{Matrix, Product, Wanted};
 /// returns the end of the step.
 ///
 /// # Errors
-/// [`TransitionError`] if the element is invalid, the step fails, or `matrix` is shorter than 4N².
+/// [`TransitionError`] if the model does not pass its [check](Model::check), the element is invalid, the step fails, or
+/// `matrix` is shorter than 4N².
 #[cfg(feature = "alloc")]
 pub fn of_step<M, const N: usize>(
     model: &M,
@@ -63,7 +64,8 @@ where
 /// row, ordered (p, q). It is that of the step at rest at the origin (T-30), which need not be solved.
 ///
 /// # Errors
-/// [`TransitionError`] if the element is invalid, its tangent is singular, or `matrix` is shorter than 4N².
+/// [`TransitionError`] if the model does not pass its [check](Model::check), the element is invalid, its tangent is
+/// singular, or `matrix` is shorter than 4N².
 #[cfg(feature = "alloc")]
 pub fn of_rest<M, const N: usize>(
     model: &M,
@@ -74,6 +76,7 @@ pub fn of_rest<M, const N: usize>(
 where
     M: Model<N>,
 {
+    model.check()?;
     let tables = crate::scheme::SchemeTable::new(element)?;
     let constraints = M::CONSTRAINTS.len();
     let mut numbers = vec![0.0; numbers_len(element, M::FORM, N, constraints)];

@@ -252,7 +252,7 @@ struct Lowerer<'a> {
     fields: Vec<bool>,
     /// Which inputs formulas use.
     inputs: Vec<bool>,
-    /// Requirements on lengths that are known only at run time.
+    /// Requirements on lengths and indices that are not known here.
     requirements: Vec<Requirement>,
     /// Unusual properties of the declaration that are not mistakes.
     remarks: Vec<String>,

@@ -202,6 +202,29 @@ fn requirements_of_lengths() {
     );
 }
 
+/// In models of fixed size fields may be indices and ends of ranges, also of arrays of a few elements.
+#[test]
+fn requirements_of_models_of_fixed_size() {
+    let text = "coordinates(x[3]), lagrangian = sum(i in 0..3, dot(x[i])^2/2 - c[i]*x[i]^2) - k*x[n]^2 - sum(i in n..w, c[i]*x[i])";
+    let mut all: Vec<String> = declared(text).requirements.iter().map(told).collect();
+    all.sort();
+    assert_eq!(
+        all,
+        [
+            "c[i] for i in n..w, 1 loops",
+            "x[i] for i in n..w, 1 loops",
+            "x[n] for , 0 loops",
+        ]
+    );
+    let outside = |index: &str| {
+        let text =
+            format!("coordinates(x[3]), lagrangian = sum(i in 0..3, dot(x[i])^2/2) - k*{index}^2");
+        declare(&text, &context(&text)).is_err()
+    };
+    assert!(!outside("x[n]") && !outside("x[n-30]") && !outside("x[n-w]"));
+    assert!(outside("x[n+3]") && outside("x[-n-1]") && outside("x[n+w+3]"));
+}
+
 /// The last five of three sites: loops would begin at zero.
 #[test]
 fn indices_that_begin_below_zero_at_some_lengths() {

@@ -16,16 +16,16 @@ use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper, Suspended};
 use tfe_runtime::{
-    CoordinateName, Element, ElementError, Facts, First, Form, Model, Second, Share, State,
+    CoordinateName, Element, Facts, First, Form, Model, ModelError, Second, Share, State,
     Statistics, StepError,
 };
 
 /// Creates a stepper; it cuts steps at kinks if asked to.
 fn cutting<'m, M: Model<N>, const N: usize>(
-    stepper: Result<Stepper<'m, M, N>, ElementError>,
+    stepper: Result<Stepper<'m, M, N>, ModelError>,
     at_kinks: bool,
 ) -> Result<Stepper<'m, M, N>, RunErrorKind> {
-    let stepper = stepper.map_err(RunErrorKind::Element)?;
+    let stepper = stepper.map_err(RunErrorKind::of_stepper)?;
     Ok(match at_kinks {
         true => stepper.at_kinks(),
         false => stepper,
@@ -79,6 +79,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     }
 
     fn check_start(&self, start: &State<N>, impulses: &[Impulse<N>]) -> Result<(), RunErrorKind> {
+        self.check().map_err(RunErrorKind::Family)?;
         check_start(start)?;
         let mut impulses = impulses.iter();
         impulses.try_for_each(|one| check_impulse(one.time, &one.value))
@@ -158,7 +159,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     where
         M: 'm,
     {
-        stepper.set_model(model).map_err(RunErrorKind::Element)
+        stepper.set_model(model).map_err(RunErrorKind::of_stepper)
     }
 
     fn advance(

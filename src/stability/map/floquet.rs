@@ -129,6 +129,10 @@ impl<'a, const N: usize> Monodromy<'a, N> {
     }
 
     fn compute<M: Model<N>>(&mut self, model: &M, period: Period) -> Result<(), FloquetError> {
+        if model.check().is_err() {
+            let (element, source) = (0, StepError::Inconsistent);
+            return Err(FloquetError::Step { element, source });
+        }
         let method = Method {
             model,
             tables: self.tables,

@@ -5,7 +5,6 @@ mod held;
 mod iteration;
 mod written;
 
-use super::error::ModelError;
 use super::inertia::Inertia;
 use super::kick::Kick;
 use super::model::{FamilyState, Model};
@@ -17,6 +16,7 @@ use super::transition::pull::Seeds;
 use super::transition::{Ground, OperatorError, TransitionOperator};
 use super::view::View;
 use crate::condense::add_multiple;
+use crate::consistency::ModelError;
 use crate::element::Element;
 use crate::error::StepError;
 use crate::inside::{InsideLoss, Seeds as Within};

@@ -2,7 +2,6 @@
 //! M.
 
 use super::dense::DenseElement;
-use super::error::ModelError;
 use super::inertia::Inertia;
 use super::model::{FamilyState, Model};
 #[cfg(feature = "sparse")]
@@ -11,6 +10,7 @@ use super::registers::{Outcome, Registers};
 #[cfg(feature = "sparse")]
 use super::scale::Scale;
 use super::space::{Kind, Leg, Problem};
+use crate::consistency::ModelError;
 use crate::error::StepError;
 #[cfg(feature = "sparse")]
 use crate::evidence::Evidence;

@@ -1,9 +1,9 @@
 //! Mass matrices of models of run-time length, and their Legendre transform.
 
-use super::error::ModelError;
 use super::model::{Block, Entries, FamilyState, Model, slope};
 #[cfg(feature = "sparse")]
 use super::{instant::Instant, node::Node, rows::Rows};
+use crate::consistency::ModelError;
 use crate::double_double::DoubleDouble;
 use crate::model::{Form, NO_TIME};
 use alloc::vec;

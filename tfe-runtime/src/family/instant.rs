@@ -1,9 +1,9 @@
 //! Constraints of a model of run-time length at one instant: admissible velocities, and reactions.
 
-use super::error::ModelError;
 use super::model::{Block, Entries, FamilyState, Gradient, Model};
 use super::node::Node;
 use super::rows::Rows;
+use crate::consistency::ModelError;
 use crate::dual::Dual;
 use crate::error::StepError;
 use alloc::vec;

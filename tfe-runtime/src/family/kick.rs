@@ -1,6 +1,5 @@
 //! The derivative of the momentum after an impulse under constraints (T-160).
 
-use super::error::ModelError;
 use super::model::{FamilyState, Model};
 use super::node::Node;
 use super::pattern::Pattern;
@@ -8,6 +7,7 @@ use super::projection::{NodeWeights, Places, Projection};
 use super::rows::Rows;
 use super::transition::OperatorError;
 use super::view::View;
+use crate::consistency::ModelError;
 use alloc::vec;
 use alloc::vec::Vec;
 

@@ -1,6 +1,6 @@
 //! The interface between a generated model of run-time length and the runtime.
 
-use super::error::ModelError;
+use crate::consistency::ModelError;
 use crate::input::{InputFailure, InputPanicked};
 use crate::length::{Declared, RunTimeLength};
 use crate::model::{CoordinateName, Facts, Form};

@@ -12,7 +12,6 @@
 
 use super::blocked::Blocked;
 use super::dense::DenseElement;
-use super::error::ModelError;
 use super::held::Solved;
 use super::inertia::Legendre;
 use super::model::{FamilyState, Gradient, Model};
@@ -22,6 +21,7 @@ use super::point::Point;
 use super::rows::Rows;
 use super::start::violated;
 use super::tangent::Parts;
+use crate::consistency::ModelError;
 use crate::constrained::element::slopes;
 use crate::constrained::residual::REST;
 use crate::control::START_TOLERANCE;

@@ -3,7 +3,6 @@
 mod kinks;
 
 use super::dense::DenseElement;
-use super::error::ModelError;
 use super::forces::Forces;
 use super::inertia::Legendre;
 #[cfg(feature = "sparse")]
@@ -11,6 +10,7 @@ use super::instant::Instant;
 use super::model::{FamilyState, Model};
 #[cfg(feature = "sparse")]
 use super::rates::Rates;
+use crate::consistency::ModelError;
 use crate::cut::{Halving, in_halves, may_be_cut};
 use crate::element::Element;
 use crate::error::StepError;

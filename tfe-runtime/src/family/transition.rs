@@ -8,7 +8,6 @@ pub use error::OperatorError;
 
 use super::blocked::Blocked;
 use super::dense::{DenseElement, jumps};
-use super::error::ModelError;
 use super::held::Held;
 use super::model::{Block, FamilyState, Gradient, Model};
 use super::pattern::Pattern;
@@ -16,6 +15,7 @@ use super::projection::{Explicit, Places};
 use super::rates::Rates;
 use super::view::View;
 use crate::condense::{Direction, Parameter, add_multiple};
+use crate::consistency::ModelError;
 use crate::element::Element;
 use crate::error::StepError;
 use crate::model::Form;

@@ -1,9 +1,9 @@
 //! A model of run-time length seen as a Lagrangian: its rates are solved for, whether it was declared by a Lagrangian
 //! or by a Hamiltonian.
 
-use super::error::ModelError;
 use super::inertia::Inertia;
 use super::model::{Block, Entries, Gradient, Model};
+use crate::consistency::ModelError;
 use crate::dual::Dual;
 use crate::length::{Declared, RunTimeLength};
 use crate::model::{CoordinateName, Facts, Form};

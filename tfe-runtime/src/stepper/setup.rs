@@ -2,8 +2,9 @@
 
 use super::carried::Carried;
 use crate::backwards::Backwards;
+use crate::consistency::ModelError;
 use crate::constrained::Foreseen;
-use crate::element::{Element, ElementError};
+use crate::element::Element;
 use crate::model::Model;
 use crate::newton::{Control, Solve};
 use crate::points::Points;
@@ -121,8 +122,8 @@ where
     /// A stepper that has made no step.
     ///
     /// # Errors
-    /// [`ElementError`] if the element is invalid.
-    pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ElementError> {
+    /// [`ModelError`] if the model does not pass its [check](Model::check), or the element is invalid.
+    pub fn new(model: &'m M, element: Element, control: Control) -> Result<Self, ModelError> {
         Self::sharing(Share::Borrowed(model), element, control)
     }
 
@@ -134,7 +135,8 @@ where
         model: Share<'m, M>,
         element: Element,
         control: Control,
-    ) -> Result<Self, ElementError> {
+    ) -> Result<Self, ModelError> {
+        model.check()?;
         let table = SchemeTable::new(element)?;
         let scheme = table.view();
         let is_possible = are_possible::<M, N>(&scheme.element) && control.solve != Solve::Newton;
@@ -181,7 +183,7 @@ where
     ///
     /// # Errors
     /// Only those of [`new`](Self::new).
-    pub fn set_model(&mut self, model: Share<'m, M>) -> Result<(), ElementError> {
+    pub fn set_model(&mut self, model: Share<'m, M>) -> Result<(), ModelError> {
         let control = Control {
             solve: self.solve,
             ..self.control

@@ -2,8 +2,9 @@
 
 use super::carried::Carried;
 use super::setup::Stepper;
+use crate::consistency::ModelError;
 use crate::constrained::Foreseen;
-use crate::element::{Element, ElementError};
+use crate::element::Element;
 use crate::model::{First, Model, Second, State};
 use crate::newton::Control;
 use crate::scheme::{SchemeTable, Tables};
@@ -98,7 +99,8 @@ where
         model: Share<'m, M>,
         control: Control,
         suspended: Suspended<N>,
-    ) -> Result<Self, ElementError> {
+    ) -> Result<Self, ModelError> {
+        model.check()?;
         if !suspended.is_of(&*model) {
             return Self::sharing(model, suspended.element, control);
         }

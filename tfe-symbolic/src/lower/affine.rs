@@ -338,12 +338,13 @@ impl Lowerer<'_> {
         let weights = affines.iter().map(|affine| weight(affine));
         let large = weights.fold(LARGE_LENGTH, u64::saturating_add);
         let of_run_time = affines.iter().any(|affine| affine.is_of_run_time());
-        let looked_at = if of_run_time && !self.is_of_run_time_length() {
-            // The lengths of such models are not checked at run time, so that only usual ones are examined.
-            USUAL_LENGTHS.map(|length| vec![length; names.len()]).into()
-        } else {
-            assignments(names.len(), large.min(MAX_LENGTH) as i64)
-        };
+        let mut looked_at = assignments(names.len(), large.min(MAX_LENGTH) as i64);
+        if of_run_time && !self.is_of_run_time_length() {
+            if names.len() > MOST_COMBINED {
+                return None;
+            }
+            looked_at.extend(combinations(names.len()));
+        }
         let mut side = None;
         for lengths in looked_at {
             let length_of = |name: &str| {
@@ -410,8 +411,12 @@ const MAX_LENGTH: u64 = 1 << 32;
 /// All lengths in this range are examined. Arrays of one element, for which `q[2*i]` is correct, are never intended.
 const SMALL_LENGTHS: (i64, i64) = (2, 12);
 
-/// Models with a fixed number of coordinates are assumed to be used with at least one of these lengths of parameters.
-const USUAL_LENGTHS: [i64; 3] = [7, 11, 22];
+/// In models of fixed size a field may be an index itself, or an end of a range: all combinations of these values are
+/// examined as well.
+const SMALL_VALUES: [i64; 9] = [0, 1, 2, 3, 4, 5, 6, 8, 12];
+
+/// The number of fields of which that is possible.
+const MOST_COMBINED: usize = 3;
 
 /// The generic lengths that stand in indices, each once.
 fn generic_lengths<'a>(affines: &[&'a Affine]) -> Vec<&'a str> {
@@ -443,6 +448,16 @@ fn assignments(count: usize, large: i64) -> Vec<Vec<i64>> {
             lengths[at] = own;
             all.push(lengths);
         }
+    }
+    all
+}
+
+/// All combinations of [`SMALL_VALUES`].
+fn combinations(count: usize) -> Vec<Vec<i64>> {
+    let mut all = vec![Vec::new()];
+    for _ in 0..count {
+        let longer = |before: &Vec<i64>| SMALL_VALUES.map(|value| [&before[..], &[value]].concat());
+        all = all.iter().flat_map(longer).collect();
     }
     all
 }

@@ -1,5 +1,5 @@
-//! Requirements on lengths that are not known here: those known at run time are checked once for each model before it
-//! is evaluated, const parameters where the kernels are compiled for their values.
+//! Requirements on lengths and indices that are not known here: fields are checked once for each model before it is
+//! evaluated, const parameters where the kernels are compiled for their values.
 
 use super::Lowerer;
 use crate::expr::graph::SumRange;
@@ -81,7 +81,8 @@ impl Lowerer<'_> {
     }
 
     fn require(&mut self, requirement: Requirement) {
-        let is_checked = self.is_of_run_time_length() || is_of_const_parameters(&requirement);
+        let is_index = matches!(requirement, Requirement::Index { .. });
+        let is_checked = self.is_of_run_time_length() || is_index;
         if is_checked && !self.requirements.contains(&requirement) {
             self.requirements.push(requirement);
         }
@@ -115,20 +116,4 @@ fn has_turns(range: &SumRange) -> bool {
     let length = range.end.plus_scaled(&range.start, -1);
     let length = length.and_then(|length| length.as_constant());
     length.is_some_and(|length| length > 0)
-}
-
-/// Whether it can be checked as soon as const parameters are known.
-fn is_of_const_parameters(requirement: &Requirement) -> bool {
-    let Requirement::Index {
-        nest,
-        place,
-        length: Extent::Known(length),
-        ..
-    } = requirement
-    else {
-        return false;
-    };
-    let bounds = nest.iter().flat_map(|range| [&range.start, &range.end]);
-    let mut affines = bounds.chain([place, length]);
-    affines.all(|affine| !affine.is_of_run_time() && !affine.holds_entry())
 }

@@ -61,8 +61,8 @@ pub fn names(arrays: &[CoordinateArray]) -> Vec<String> {
     names
 }
 
-/// A requirement on a model of run-time length that is checked before it is evaluated; `text` and `ranges` are as the
-/// user wrote them.
+/// A requirement on lengths and indices that is checked before a model is evaluated; `text` and `ranges` are as the user
+/// wrote them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Requirement {
     /// An index stays inside its array on all turns of a nest of loops.
@@ -100,6 +100,24 @@ pub enum Requirement {
         /// One past its last value.
         end: Affine,
     },
+}
+
+impl Requirement {
+    /// Whether it can be checked as soon as const parameters are known.
+    pub fn is_of_const_parameters(&self) -> bool {
+        let Self::Index {
+            nest,
+            place,
+            length: Extent::Known(length),
+            ..
+        } = self
+        else {
+            return false;
+        };
+        let bounds = nest.iter().flat_map(|range| [&range.start, &range.end]);
+        let mut affines = bounds.chain([place, length]);
+        affines.all(|affine| !affine.is_of_run_time() && !affine.holds_entry())
+    }
 }
 
 /// The length of an array.
@@ -318,7 +336,7 @@ pub struct Declared {
     pub crate_path: Option<String>,
     /// The fields that formulas use, in the order of the struct.
     pub used_fields: Vec<String>,
-    /// Requirements on lengths that are not known here: lengths of run time, or const parameters.
+    /// Requirements on lengths and indices that are not known here: those of fields, or of const parameters.
     pub requirements: Vec<Requirement>,
     /// Unusual properties of the declaration that are not mistakes: sentences with names between backticks.
     pub remarks: Vec<String>,

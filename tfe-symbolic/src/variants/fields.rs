@@ -10,12 +10,13 @@ pub(super) fn keep_used(model: &mut Declared, fields: &[String], added: &[(Strin
     let mut used = Used::default();
     used.formulas(model);
     model.requirements.retain(|requirement| match requirement {
-        Requirement::FieldLength { field, .. }
-        | Requirement::Index {
-            length: Extent::OfField(field),
-            ..
-        } => used.0.contains(field),
-        _ => true,
+        Requirement::FieldLength { field, .. } => used.0.contains(field),
+        // An index of fields that no formula uses any more stands nowhere.
+        Requirement::Index { place, length, .. } => match length {
+            Extent::OfField(field) => used.0.contains(field) && used.has_fields_of(place),
+            Extent::Known(_) => used.has_fields_of(place),
+        },
+        Requirement::Turns { .. } => true,
     });
     for requirement in &model.requirements {
         used.requirement(requirement);
@@ -109,6 +110,15 @@ impl Used {
                 IndexSymbol::Loop(_) | IndexSymbol::ConstParameter(_) => {}
             }
         }
+    }
+
+    /// Whether the fields and lists in an index are among them.
+    fn has_fields_of(&self, index: &Affine) -> bool {
+        index.terms.iter().all(|(symbol, _)| match symbol {
+            IndexSymbol::Field(name) => self.0.contains(name),
+            IndexSymbol::Entry(list, place) => self.0.contains(list) && self.has_fields_of(place),
+            IndexSymbol::Loop(_) | IndexSymbol::ConstParameter(_) => true,
+        })
     }
 
     fn requirement(&mut self, requirement: &Requirement) {

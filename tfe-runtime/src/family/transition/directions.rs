@@ -1,12 +1,12 @@
 //! The derivatives of a step by its start time, its length, parameters and damping.
 
-use super::super::error::ModelError;
 use super::super::model::Model;
 use super::super::projection::Explicit;
 use super::super::rates::Rates;
 use super::super::view::View;
 use super::{Change, OperatorError, TransitionOperator};
 use crate::condense::{Direction, Parameter};
+use crate::consistency::ModelError;
 use crate::dual::Dual;
 use crate::scheme::Tables as _;
 use alloc::vec;

@@ -1,7 +1,7 @@
 //! Why a step of a model of run-time length has no derivative.
 
+use crate::consistency::ModelError;
 use crate::error::StepError;
-use crate::family::error::ModelError;
 use core::fmt;
 
 /// Why the derivative of a step of a model of run-time length could not be computed.

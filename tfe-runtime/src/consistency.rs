@@ -1,10 +1,11 @@
-//! The errors of models of run-time length, and of what is requested of them.
+//! Whether a model is consistent: lengths, indices and ranges that a declaration leaves to the run time, their checks,
+//! and the errors of what is requested of models of run-time length.
 
 use crate::element::{Element, ElementError};
 use core::fmt;
 
-/// Why a model of run-time length is inconsistent, or not supported.
-#[derive(Clone, Debug, PartialEq)]
+/// Why a model is inconsistent, or not supported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ModelError {
     /// A coordinate array without elements.
@@ -220,11 +221,133 @@ impl fmt::Display for ModelError {
     }
 }
 
+impl From<ElementError> for ModelError {
+    fn from(error: ElementError) -> Self {
+        Self::Element(error)
+    }
+}
+
 impl core::error::Error for ModelError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
             Self::Element(error) => Some(error),
             _ => None,
+        }
+    }
+}
+
+/// Checks of lengths, indices and ranges, which generated code calls.
+#[doc(hidden)]
+pub mod checks {
+    use super::ModelError;
+
+    /// Longer than any array, and small enough that sums of several such lengths do not overflow.
+    const LONGEST: i64 = 1 << 40;
+
+    /// Checks that an array may have this length.
+    ///
+    /// # Errors
+    /// [`ModelError::Length`].
+    pub fn length(field: &'static str, length: usize) -> Result<(), ModelError> {
+        if i64::try_from(length).is_ok_and(|length| length <= LONGEST) {
+            return Ok(());
+        }
+        Err(ModelError::Length { field, length })
+    }
+
+    /// Checks that an array of coordinates is not empty.
+    ///
+    /// # Errors
+    /// [`ModelError::NoElements`].
+    pub fn elements(array: &'static str, length: usize) -> Result<(), ModelError> {
+        if length == 0 {
+            return Err(ModelError::NoElements { array });
+        }
+        Ok(())
+    }
+
+    /// Checks that a range is not empty.
+    ///
+    /// # Errors
+    /// [`ModelError::EmptyRange`].
+    pub fn turns(ranges: &'static str, start: i64, end: i64) -> Result<(), ModelError> {
+        if start >= end {
+            return Err(ModelError::EmptyRange { ranges, start, end });
+        }
+        Ok(())
+    }
+
+    /// Checks that an index is within its array.
+    ///
+    /// # Errors
+    /// [`ModelError::Index`].
+    pub fn index(
+        (array, index, ranges): (&'static str, &'static str, &'static str),
+        value: i64,
+        length: usize,
+    ) -> Result<(), ModelError> {
+        if usize::try_from(value).is_ok_and(|value| value < length) {
+            return Ok(());
+        }
+        Err(ModelError::Index {
+            array,
+            index,
+            ranges,
+            value,
+            length,
+        })
+    }
+
+    /// Checks that an index computed from an entry of a list (its name, the list, the place) is within its array.
+    ///
+    /// # Errors
+    /// [`ModelError::ListEntry`].
+    pub fn entry(
+        (array, index, ranges): (&'static str, &'static str, &'static str),
+        (list, entries, place): (&'static str, &[usize], usize),
+        value: i64,
+        length: usize,
+    ) -> Result<(), ModelError> {
+        if usize::try_from(value).is_ok_and(|value| value < length) {
+            return Ok(());
+        }
+        Err(ModelError::ListEntry {
+            list,
+            place,
+            entry: entries.get(place).copied().unwrap_or(usize::MAX),
+            array,
+            index,
+            ranges,
+            length,
+        })
+    }
+
+    /// An entry of a list as a term of an index; entries larger than any length are limited to that.
+    #[must_use]
+    pub fn small(entry: usize) -> i64 {
+        i64::try_from(entry).map_or(LONGEST, |entry| entry.min(LONGEST))
+    }
+
+    /// Checks that an array field is as long as the largest of its indices requires: (length, index, ranges) of each.
+    ///
+    /// # Errors
+    /// [`ModelError::FieldLength`].
+    pub fn field_length(
+        field: &'static str,
+        length: usize,
+        uses: &[(i64, &'static str, &'static str)],
+    ) -> Result<(), ModelError> {
+        match uses.iter().max_by_key(|(expected, ..)| *expected) {
+            Some((expected, index, ranges)) if usize::try_from(*expected) != Ok(length) => {
+                Err(ModelError::FieldLength {
+                    field,
+                    length,
+                    expected: *expected,
+                    index,
+                    ranges,
+                })
+            }
+            _ => Ok(()),
         }
     }
 }

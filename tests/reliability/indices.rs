@@ -1,0 +1,293 @@
+//! Fields that are indices in models of fixed size: they choose elements, and are checked before anything is evaluated.
+
+use tfe::boundary::BoundaryError;
+use tfe::periodic::OrbitError;
+use tfe::prelude::*;
+use tfe::runtime::First;
+use tfe::runtime::step::{Control, Stepper};
+use tfe::sensitivity::Loss;
+use tfe::stability::{LinearModel, LinearModelError, TransitionError};
+use tfe::{AssemblyError, AtError, ConsistentError, ModelError, RunErrorKind, StepError};
+
+/// Three masses in a row. One is tied to a wall, by a spring like one of the row, and damped.
+#[dynamics(
+    coordinates(x[3]),
+    lagrangian = sum(i in 0..3, m/2*dot(x[i])^2) - sum(i in 0..2, c[i]/2*(x[i+1] - x[i])^2) - c[tie]/2*x[held]^2,
+    force(x[held]) = -d*dot(x[held]),
+    output(shown) = x[held],
+    solver(Fast, Mixed::<3>),
+)]
+#[derive(Clone, Copy)]
+struct Tied {
+    m: f64,
+    c: [f64; 3],
+    d: f64,
+    tie: usize,
+    held: usize,
+}
+
+/// The same with the indices as numbers.
+#[dynamics(
+    coordinates(x[3]),
+    lagrangian = sum(i in 0..3, m/2*dot(x[i])^2) - sum(i in 0..2, c[i]/2*(x[i+1] - x[i])^2) - c[2]/2*x[1]^2,
+    force(x[1]) = -d*dot(x[1]),
+)]
+struct Written {
+    m: f64,
+    c: [f64; 3],
+    d: f64,
+}
+
+const C: [f64; 3] = [2.0, 3.0, 5.0];
+const START: State<3> = State {
+    q: [0.5, -0.25, 1.0],
+    p: [0.125, 0.5, -0.75],
+};
+
+fn tied(tie: usize, held: usize) -> Tied {
+    Tied {
+        m: 1.5,
+        c: C,
+        d: 0.25,
+        tie,
+        held,
+    }
+}
+
+#[test]
+fn fields_choose_the_elements() {
+    let (q, v) = (START.q, START.p);
+    for (tie, held) in (0..3).flat_map(|tie| (0..3).map(move |held| (tie, held))) {
+        let model = tied(tie, held);
+        assert_eq!(model.check(), Ok(()));
+        let mut by_q = [0.0; 3];
+        for i in 0..2 {
+            let pull = C[i] * (q[i + 1] - q[i]);
+            by_q[i] += pull;
+            by_q[i + 1] -= pull;
+        }
+        by_q[held] -= C[tie] * q[held];
+        let mut force = [0.0; 3];
+        force[held] = -0.25 * v[held];
+        let mut first = First::ZERO;
+        model.first(0.0, &q, &v, &mut first);
+        for i in 0..3 {
+            // All numbers have few bits.
+            assert_eq!(first.q[i], by_q[i], "{tie}, {held}: {i}");
+            assert_eq!(first.force[i], force[i], "{tie}, {held}: {i}");
+        }
+        assert_eq!(model.shown(0.0, q, v), q[held]);
+    }
+    let chosen = tied(2, 1);
+    let written = Written {
+        m: 1.5,
+        c: C,
+        d: 0.25,
+    };
+    let run = Simulation::new(&chosen).step(0.05).run(START, 0.0..5.0);
+    let expected = Simulation::new(&written).step(0.05).run(START, 0.0..5.0);
+    let (run, expected) = (run.expect("a run"), expected.expect("a run"));
+    for (one, other) in run.last().q.iter().zip(&expected.last().q) {
+        // Roundings of a hundred steps.
+        assert!((one - other).abs() <= 1e-12, "{one} {other}");
+    }
+    let mut state = START;
+    let mut fast = Fast::new(&chosen, 0.05);
+    for _ in 0..100 {
+        fast.advance(&mut state).expect("a step");
+    }
+    for (one, other) in state.q.iter().zip(&expected.last().q) {
+        // Mixed::<3>: order 4 at a step of 0.05, with frequencies up to 3.
+        assert!((one - other).abs() <= 1e-4, "{one} {other}");
+    }
+}
+
+fn outside() -> (Tied, ModelError, RunErrorKind) {
+    let error = ModelError::Index {
+        array: "x",
+        index: "held",
+        ranges: "",
+        value: 3,
+        length: 3,
+    };
+    (tied(2, 3), error, RunErrorKind::Family(error))
+}
+
+#[test]
+fn an_index_outside_its_array_is_told() {
+    let (wrong, error, _) = outside();
+    assert_eq!(wrong.check(), Err(error));
+    assert_eq!(
+        error.to_string(),
+        "the index of `x[held]` becomes 3, but `x` has 3 elements"
+    );
+    let error = tied(3, 0).check().expect_err("no fourth spring");
+    assert_eq!(
+        error.to_string(),
+        "the index of `c[tie]` becomes 3, but `c` has 3 elements"
+    );
+    let length = usize::MAX;
+    let error = ModelError::Length {
+        field: "held",
+        length,
+    };
+    assert_eq!(tied(0, length).check(), Err(error));
+}
+
+#[test]
+fn runs_with_an_index_outside_do_not_begin() {
+    let (wrong, _, kind) = outside();
+    let run = || Simulation::new(&wrong).step(0.1);
+    let span = || 0.0..1.0;
+    let failed = run().run(START, span()).expect_err("no fourth mass");
+    assert_eq!(failed.kind(), &kind);
+    assert_eq!(failed.partial().states().len(), 1);
+    assert_eq!(run().steps(START, 0.0).next(), Some(Err(kind.clone())));
+    let found = run().accuracy(1e-6).run(START, span()).err();
+    assert_eq!(found.as_ref().map(tfe::RunError::kind), Some(&kind));
+    let found = run().run_estimated(START, span()).err();
+    assert_eq!(found.as_ref().map(tfe::RunError::kind), Some(&kind));
+    let found = run().run_linearised(START, span()).err();
+    assert_eq!(found.as_ref().map(tfe::RunError::kind), Some(&kind));
+    let found = run().run_sensitive(START, span()).err();
+    assert_eq!(found.as_ref().map(tfe::RunError::kind), Some(&kind));
+    let loss = Loss::at_end(|node| node.q[0]);
+    let found = run().gradient(START, span(), &loss).err();
+    assert_eq!(found.as_ref().map(tfe::RunError::kind), Some(&kind));
+    let point = run()
+        .section("shown", Crossing::Either, START, 0.0)
+        .next()
+        .and_then(Result::err);
+    assert_eq!(point, Some(kind.clone()));
+    // A motion of another model.
+    let right = tied(2, 1);
+    let motion = Simulation::new(&right).step(0.1).run(START, span());
+    let motion = motion.expect("a run");
+    let integral = motion.integral(&wrong, "shown");
+    assert!(matches!(integral, Err(AtError::Model(_))), "{integral:?}");
+    let checkpoint = motion.checkpoint().expect("complete");
+    let failed = run().resume(checkpoint, 2.0).expect_err("no fourth mass");
+    assert_eq!(failed.kind(), &kind);
+}
+
+#[test]
+fn ensembles_fail_where_an_index_is_outside() {
+    let (wrong, _, kind) = outside();
+    let ends = Ensemble::new(&wrong).step(0.1).run(&[START; 9], 0.0..1.0);
+    let ends = ends.expect("an ensemble");
+    assert_eq!(ends.failures().count(), 9);
+    assert!(ends.iter().all(|end| end.as_ref().err() == Some(&kind)));
+    let models = [tied(2, 1), wrong];
+    for span in [0.0..1.0, 0.0..0.0] {
+        let ends = Ensemble::of_models(&models).step(0.1).run(&[START], span);
+        let ends = ends.expect("an ensemble");
+        assert!(ends[0].is_ok());
+        assert_eq!(ends[1].as_ref().err(), Some(&kind));
+    }
+    let mut begun = Ensemble::new(&wrong).step(0.1).begin(&[START; 9], 0.0);
+    let begun = begun.as_mut().expect("starts");
+    let ends = begun.run_to(1.0).expect("an ensemble");
+    assert!(ends.iter().all(|end| end.as_ref().err() == Some(&kind)));
+}
+
+#[test]
+fn whatever_takes_a_model_refuses_an_index_outside() {
+    let (wrong, error, _) = outside();
+    let stepper = Stepper::new(&wrong, Mixed::<4>.into(), Control::default());
+    assert_eq!(stepper.err(), Some(error));
+    let mut solver = Fast::new(&wrong, 0.1);
+    let mut state = START;
+    assert_eq!(solver.advance(&mut state), Err(StepError::Inconsistent));
+    assert_eq!(state, START);
+    let inconsistent = TransitionError::Step(StepError::Inconsistent);
+    let matrix = stability::transition_matrix(&wrong, Mixed::<4>, &START, 0.0, 0.1);
+    assert_eq!(matrix.err(), Some(inconsistent));
+    let linear = LinearModel::about(&wrong, 0.0, &START);
+    assert_eq!(linear.err(), Some(LinearModelError::Model(error)));
+    let consistent = wrong.consistent_state(START.q, [0.0; 3]);
+    assert_eq!(consistent.err(), Some(ConsistentError::Check(error)));
+    let arc = BoundaryValue::of(&wrong).from_to([0.0; 3], [1.0; 3], 0.0..1.0);
+    let assembly = AssemblyError::Model(error);
+    let arc = arc.solve().err();
+    assert_eq!(arc, Some(BoundaryError::Assembly(assembly.clone())));
+    let orbit = PeriodicOrbit::of(&wrong).period(1.0).solve().err();
+    assert_eq!(orbit, Some(OrbitError::Assembly(assembly)));
+}
+
+/// Where there is no error to return, there are no numbers either.
+#[test]
+fn numbers_of_a_model_with_an_index_outside_are_unknown() {
+    let (wrong, ..) = outside();
+    let start = wrong.state(START.q, [0.0; 3]);
+    assert!(start.q == START.q && start.p.iter().all(|p| p.is_nan()));
+    let velocity = wrong.velocity(0.0, &START);
+    assert!(velocity.iter().all(|v| v.is_nan()));
+    assert!(wrong.shown(0.0, START.q, [0.0; 3]).is_nan());
+}
+
+/// The momentum of the time is an energy, which is evaluated for it.
+#[test]
+fn times_of_a_model_with_an_index_outside_are_unknown() {
+    #[dynamics(
+        coordinates(x, y),
+        momenta(px, py),
+        let r = hypot(x, y),
+        hamiltonian = (px^2 + py^2)/2 - mu[body]/r,
+        time_transformation = r,
+    )]
+    struct Planet {
+        mu: [f64; 2],
+        body: usize,
+    }
+    let planet = |body| Planet {
+        mu: [1.0, 4.0],
+        body,
+    };
+    let start = |body| planet(body).state([1.0, 0.0], [0.0, 1.0]);
+    assert_eq!(start(1).p, [0.0, 1.0, 3.5]);
+    assert!(start(2).p[2].is_nan());
+    let run = Simulation::new(&planet(2))
+        .step(0.1)
+        .run(start(1), 0.0..1.0);
+    let kind = run.expect_err("no third body").kind().clone();
+    assert!(matches!(kind, RunErrorKind::Family(_)), "{kind}");
+}
+
+/// What a run drives with inputs, and the ends of a sum.
+#[test]
+fn ends_of_sums_are_checked_with_inputs_too() {
+    #[dynamics(
+        coordinates(x),
+        lagrangian = dot(x)^2/2 - sum(i in begin..end, c[i]*x^i),
+        input(u),
+        force(x) = u,
+    )]
+    struct Series {
+        c: [f64; 4],
+        begin: usize,
+        end: usize,
+    }
+    let series = |begin, end| Series {
+        c: [1.0, 2.0, 3.0, 4.0],
+        begin,
+        end,
+    };
+    let value = |begin, end| -> f64 { series(begin, end).energy_function(0.0, &[0.5], &[0.0]) };
+    // −2 x − 3 x², and nothing.
+    assert!((value(1, 3) + 1.75).abs() <= 1e-14);
+    assert_eq!(value(3, 1), 0.0);
+    let start = State { q: [0.5], p: [0.0] };
+    let wrong = series(1, 5);
+    let error = ModelError::Index {
+        array: "c",
+        index: "i",
+        ranges: "i in begin..end",
+        value: 4,
+        length: 4,
+    };
+    let kind = RunErrorKind::Family(error);
+    let run = || Simulation::new(&wrong).step(0.1);
+    let found = run().input("u", |t| t).run(start, 0.0..1.0).err();
+    assert_eq!(found.as_ref().map(tfe::RunError::kind), Some(&kind));
+    assert_eq!(run().hold(start, 0.0).err(), Some(kind));
+}
