@@ -136,6 +136,28 @@ fn a_single_index_is_checked_too() {
     assert_eq!(error.to_string(), message);
 }
 
+/// Where a field chooses the element, a vector may have any length that holds it.
+#[test]
+fn chosen_elements_are_checked_alone() {
+    #[dynamics(coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) - c[k]*q[0]^2)]
+    struct Chosen {
+        n: usize,
+        k: usize,
+        c: Vec<f64>,
+    }
+    let chosen = |k, c: usize| {
+        let c = vec![1.0; c];
+        Chosen { n: 2, k, c }.check()
+    };
+    assert_eq!(
+        (chosen(0, 1), chosen(0, 4), chosen(3, 4)),
+        (Ok(()), Ok(()), Ok(()))
+    );
+    let error = chosen(4, 4).expect_err("no fifth");
+    let message = "the index of `c[k]` becomes 4, but `c` has 4 elements";
+    assert_eq!(error.to_string(), message);
+}
+
 #[test]
 fn states_of_another_length_are_refused() {
     let model = coupled(3, 3, 3, 2);

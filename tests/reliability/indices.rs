@@ -253,6 +253,75 @@ fn times_of_a_model_with_an_index_outside_are_unknown() {
     assert!(matches!(kind, RunErrorKind::Family(_)), "{kind}");
 }
 
+/// Vectors are as long as the ranges of their indices ask for; of which a field chooses an element, any length will do
+/// that holds it.
+#[test]
+fn lengths_of_vectors_are_checked() {
+    #[dynamics(
+        coordinates(x[2]),
+        lagrangian = sum(i in 0..2, m[i]/2*dot(x[i])^2) - sum(i in 0..terms, c[i]*x[0]^i) - w[k]/2*x[1]^2,
+    )]
+    struct Vectors {
+        m: Vec<f64>,
+        terms: usize,
+        c: Vec<f64>,
+        w: Vec<f64>,
+        k: usize,
+    }
+    let vectors = |m: usize, c: usize, w: usize| Vectors {
+        m: vec![1.0; m],
+        terms: 3,
+        c: vec![0.5; c],
+        w: vec![2.0; w],
+        k: 1,
+    };
+    for w in [2, 5] {
+        assert_eq!(vectors(2, 3, w).check(), Ok(()));
+    }
+    let message = |m, c, w| {
+        let error = vectors(m, c, w).check().expect_err("a wrong length");
+        error.to_string()
+    };
+    for m in [1, 3] {
+        let expected =
+            format!("`m` has {m} elements, but `m[i]` in the sum over `i in 0..2` needs 2");
+        assert_eq!(message(m, 3, 2), expected);
+    }
+    for c in [0, 2, 4] {
+        let expected =
+            format!("`c` has {c} elements, but `c[i]` in the sum over `i in 0..terms` needs 3");
+        assert_eq!(message(2, c, 2), expected);
+    }
+    assert_eq!(
+        message(2, 3, 1),
+        "the index of `w[k]` becomes 1, but `w` has 1 elements"
+    );
+    // No terms need no elements.
+    let none = Vectors {
+        terms: 0,
+        ..vectors(2, 0, 2)
+    };
+    assert_eq!(none.check(), Ok(()));
+    let start = State {
+        q: [0.5, 0.25],
+        p: [0.0; 2],
+    };
+    let short = vectors(2, 2, 2);
+    let error = ModelError::FieldLength {
+        field: "c",
+        length: 2,
+        expected: 3,
+        index: "i",
+        ranges: "i in 0..terms",
+    };
+    let run = Simulation::new(&short).step(0.1).run(start, 0.0..1.0);
+    let found = run.err();
+    let kind = RunErrorKind::Family(error);
+    assert_eq!(found.as_ref().map(tfe::RunError::kind), Some(&kind));
+    let stepper = Stepper::new(&short, Mixed::<4>.into(), Control::default());
+    assert_eq!(stepper.err(), Some(error));
+}
+
 /// What a run drives with inputs, and the ends of a sum.
 #[test]
 fn ends_of_sums_are_checked_with_inputs_too() {

@@ -202,6 +202,19 @@ fn requirements_of_lengths() {
     );
 }
 
+/// An element that a field chooses may be any of a vector.
+#[test]
+fn requirements_of_chosen_elements() {
+    for length in ["3", "w"] {
+        let text = format!(
+            "coordinates(x[{length}]), lagrangian = sum(i in 0..{length}, dot(x[i])^2/2) - c[n]*x[0]^2"
+        );
+        let all: Vec<String> = declared(&text).requirements.iter().map(told).collect();
+        assert!(all.contains(&"c[n] for , 0 loops".to_owned()), "{all:?}");
+        assert!(!all.iter().any(|one| one.starts_with("c:")), "{all:?}");
+    }
+}
+
 /// In models of fixed size fields may be indices and ends of ranges, also of arrays of a few elements.
 #[test]
 fn requirements_of_models_of_fixed_size() {
@@ -211,6 +224,8 @@ fn requirements_of_models_of_fixed_size() {
     assert_eq!(
         all,
         [
+            "c: 3 by [i] for i in 0..3",
+            "c: w by [i] for i in n..w",
             "c[i] for i in n..w, 1 loops",
             "x[i] for i in n..w, 1 loops",
             "x[n] for , 0 loops",

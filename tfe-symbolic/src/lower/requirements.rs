@@ -34,8 +34,12 @@ impl Lowerer<'_> {
         self.require(requirement);
     }
 
-    /// Notes that an array field has to be as long as its largest index asks for.
+    /// Notes that an array field has to be as long as its largest index asks for. An index that fields choose says nothing
+    /// about the end of the array, and only has to stay inside.
     pub(super) fn require_length(&mut self, field: &str, place: &Affine) {
+        if place.variables().is_empty() && place.as_constant().is_none() {
+            return self.require_index(field, place, Extent::OfField(field.to_owned()));
+        }
         let one = Affine::constant(1);
         let Some(length) = self
             .extreme(place, true)
@@ -81,8 +85,9 @@ impl Lowerer<'_> {
     }
 
     fn require(&mut self, requirement: Requirement) {
-        let is_index = matches!(requirement, Requirement::Index { .. });
-        let is_checked = self.is_of_run_time_length() || is_index;
+        // Sums without terms are zero in models of fixed size; loops of others carry parts of a sum to the next turn.
+        let is_about_turns = matches!(requirement, Requirement::Turns { .. });
+        let is_checked = self.is_of_run_time_length() || !is_about_turns;
         if is_checked && !self.requirements.contains(&requirement) {
             self.requirements.push(requirement);
         }
