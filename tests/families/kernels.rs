@@ -268,6 +268,48 @@ fn pairs_of_differences_fill_their_diagonal() {
     }
 }
 
+/// Pairs of which the second is compared with the neighbour of the first: the last site has no neighbour, and no pairs.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n, sum(j in i+1..n, k*sin(q[i+1])*q[j])),
+)]
+struct Neighbours {
+    n: usize,
+    k: f64,
+}
+
+#[test]
+fn nothing_is_read_for_sums_without_terms() {
+    let k = 0.7;
+    for n in [1, 2, 5] {
+        let model = Neighbours { n, k };
+        assert_eq!(model.check(), Ok(()));
+        let (q, v) = (&Q[..n], &V[..n]);
+        let (mut energy, mut slopes) = (0.0, [0.0; 5]);
+        for i in 0..n {
+            energy += v[i] * v[i] / 2.0;
+            for j in i + 1..n {
+                let next = q[i + 1];
+                energy -= k * next.sin() * q[j];
+                slopes[i + 1] -= k * next.cos() * q[j];
+                slopes[j] -= k * next.sin();
+            }
+        }
+        close(model.energy_function(T, q, v), energy, ORDER);
+        let [mut z, mut by_q] = [[f64::NAN; 5]; 2];
+        let gradient = Gradient {
+            z: &mut z[..n],
+            q: &mut by_q[..n],
+            force: &mut [],
+        };
+        family::Model::first(&model, T, q, v, gradient);
+        for a in 0..n {
+            close(by_q[a], slopes[a], ORDER);
+            close(z[a], v[a], ORDER);
+        }
+    }
+}
+
 /// With fixed size, whose kernels check nothing themselves.
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - c[m-2]*x^2/2)]
 struct LastButOne {

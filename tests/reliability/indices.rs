@@ -322,6 +322,27 @@ fn lengths_of_vectors_are_checked() {
     assert_eq!(stepper.err(), Some(error));
 }
 
+/// The last mass has no neighbour, and the sum over those after it no terms.
+#[test]
+fn nothing_is_read_for_sums_without_terms() {
+    #[dynamics(
+        coordinates(x[N]),
+        lagrangian = sum(i in 0..N, dot(x[i])^2/2) - sum(i in 0..N, sum(j in i+1..N, k*x[i+1]*x[j])),
+    )]
+    struct Triangle<const N: usize> {
+        k: f64,
+    }
+    let triangle = Triangle::<3> { k: 2.0 };
+    let (x, v) = ([0.5, -0.25, 1.0], [0.0; 3]);
+    let energy = triangle.energy_function(0.0, &x, &v);
+    // Numbers of few bits.
+    assert_eq!(energy, -2.0 * (x[1] * x[1] + x[1] * x[2] + x[2] * x[2]));
+    let mut first = First::ZERO;
+    triangle.first(0.0, &x, &v, &mut first);
+    let pull = [0.0, 2.0 * x[1] + x[2], x[1] + 2.0 * x[2]];
+    assert_eq!(first.q, pull.map(|pull| -2.0 * pull));
+}
+
 /// What a run drives with inputs, and the ends of a sum.
 #[test]
 fn ends_of_sums_are_checked_with_inputs_too() {

@@ -35,6 +35,7 @@ fn less_each(
     affine: &Affine,
     less: impl Fn(&TokenStream, &TokenStream) -> TokenStream,
 ) -> TokenStream {
+    let affine = &affine.plain();
     let mut sum: Option<TokenStream> = None;
     for (symbol, coefficient) in affine.terms.iter().filter(|(_, c)| *c > 0) {
         let term = scaled(symbol, *coefficient);
@@ -107,11 +108,13 @@ fn symbol_tokens(symbol: &IndexSymbol) -> TokenStream {
             let list = identifier(list);
             at(&quote!(self.#list), &[place])
         }
+        IndexSymbol::Within(_) => quote!(0),
     }
 }
 
 /// An integer as an `i64` expression: `i as i64 + 1`.
 pub(crate) fn signed(affine: &Affine) -> TokenStream {
+    let affine = &affine.plain();
     let mut sum = TokenStream::new();
     for (symbol, coefficient) in &affine.terms {
         let symbol = match symbol {
@@ -144,6 +147,7 @@ pub(crate) fn signed(affine: &Affine) -> TokenStream {
 
 /// An integer as a number.
 pub(crate) fn real(affine: &Affine) -> TokenStream {
+    let affine = &affine.plain();
     let constant = number(affine.constant as f64);
     let terms = affine.terms.iter().map(|(symbol, coefficient)| {
         let (symbol, coefficient) = (symbol_tokens(symbol), number(*coefficient as f64));

@@ -240,6 +240,54 @@ fn requirements_of_models_of_fixed_size() {
     assert!(outside("x[n+3]") && outside("x[-n-1]") && outside("x[n+w+3]"));
 }
 
+/// `q[n]` and `q[-1]` are read nowhere: the sums that they stand in have no terms on those turns.
+#[test]
+fn indices_are_needed_where_a_sum_has_terms() {
+    let family = "coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) \
+        - sum(i in 0..n, sum(j in i+1..n, k*cos(q[i+1]-q[j])*q[i+1]^2) + sum(j in 0..i, k*sin(q[i-1])*q[j]))";
+    for n in [1, 2, 4] {
+        let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (j, i)));
+        let terms = pairs.map(|(i, j)| {
+            let (next, before) = (i + 1, j - 1);
+            format!(" - k*cos(q[{next}]-q[{j}])*q[{next}]^2 - k*sin(q[{before}])*q[{i}]")
+        });
+        let terms: String = terms.collect();
+        let kinetic = joined(0..n, |i| format!("dot(q[{i}])^2/2"));
+        let written = format!("coordinates(q[{n}]), lagrangian = {kinetic}{terms}");
+        check(n, 0, family, &written);
+    }
+    let mut all: Vec<String> = declared(family).requirements.iter().map(told).collect();
+    all.sort();
+    assert_eq!(
+        all,
+        [
+            "q[i+1] for i in 0..n, j in i+1..n, 2 loops",
+            "q[i-1] for i in 0..n, j in 0..i, 2 loops",
+            "turns of i in 0..n",
+        ]
+    );
+}
+
+/// The same where lengths are literal and the sums too long to be written out.
+#[test]
+fn loops_of_literal_length_read_what_is_there() {
+    let run = |bound: usize| {
+        let text = format!(
+            "coordinates(q[20]), lagrangian = sum(i in 0..20, dot(q[i])^2/2) \
+             - sum(i in 0..{bound}, sum(j in i+1..20, k*sin(q[i+1])*q[j]))"
+        );
+        let program = Derivation::of(&declared(&text)).program(ALL);
+        interpret(&program, &environment(20, 0, 0)).unwrap_or_else(|e| panic!("{e}\n{program}"))
+    };
+    let (whole, shorter) = (run(20), run(19));
+    // Up to 190 terms of size one.
+    assert!((whole.value - shorter.value).abs() <= 1e-12);
+    assert_eq!(whole.q.len(), shorter.q.len());
+    for (one, other) in whole.q.iter().zip(&shorter.q) {
+        assert!((one - other).abs() <= 1e-12, "{one} {other}");
+    }
+}
+
 /// The last five of three sites: loops would begin at zero.
 #[test]
 fn indices_that_begin_below_zero_at_some_lengths() {

@@ -17,6 +17,9 @@ pub enum IndexSymbol {
     Field(String),
     /// An entry of a `Vec<usize>` field of the struct, by its place in the list.
     Entry(String, Affine),
+    /// Zero. It keeps the index that it is added to inside this loop: where the loop has no turns, the index may be
+    /// outside its array.
+    Within(LoopVariable),
 }
 
 /// `constant + Σ coefficient · symbol`, sorted by symbol, without zero coefficients.
@@ -92,6 +95,16 @@ impl Affine {
         Some(sum)
     }
 
+    /// The same without what keeps it inside loops.
+    #[must_use]
+    pub fn plain(&self) -> Self {
+        let mut plain = self.clone();
+        plain
+            .terms
+            .retain(|(symbol, _)| !matches!(symbol, IndexSymbol::Within(_)));
+        plain
+    }
+
     /// Whether it depends on a field of the struct, so that it is known at run time only.
     pub fn is_of_run_time(&self) -> bool {
         let field = |(symbol, _): &(IndexSymbol, i64)| matches!(symbol, IndexSymbol::Field(_));
@@ -111,10 +124,10 @@ impl Affine {
         self.entries().next().is_some()
     }
 
-    /// All loop variables in it, those in places of lists too.
+    /// All loop variables in it, those in places of lists and those of loops that it is kept in, too.
     pub(crate) fn variables(&self) -> Vec<LoopVariable> {
         let own = |(symbol, _): &(IndexSymbol, i64)| match symbol {
-            IndexSymbol::Loop(variable) => vec![*variable],
+            IndexSymbol::Loop(variable) | IndexSymbol::Within(variable) => vec![*variable],
             IndexSymbol::Entry(_, place) => place.variables(),
             IndexSymbol::ConstParameter(_) | IndexSymbol::Field(_) => Vec::new(),
         };
@@ -130,10 +143,10 @@ impl Affine {
         own.map_or(0, |(_, factor)| *factor)
     }
 
-    /// Whether it depends on the loop variable.
+    /// Whether it depends on the loop variable, or is kept inside its loop.
     pub fn depends_on(&self, variable: LoopVariable) -> bool {
         self.terms.iter().any(|(symbol, _)| match symbol {
-            IndexSymbol::Loop(own) => *own == variable,
+            IndexSymbol::Loop(own) | IndexSymbol::Within(own) => *own == variable,
             IndexSymbol::Entry(_, place) => place.depends_on(variable),
             IndexSymbol::ConstParameter(_) | IndexSymbol::Field(_) => false,
         })
@@ -159,6 +172,7 @@ impl fmt::Display for IndexSymbol {
             Self::Loop(variable) => variable.fmt(f),
             Self::ConstParameter(name) | Self::Field(name) => f.write_str(name),
             Self::Entry(list, place) => write!(f, "{list}[{place}]"),
+            Self::Within(_) => f.write_str("0"),
         }
     }
 }
@@ -166,7 +180,9 @@ impl fmt::Display for IndexSymbol {
 impl fmt::Display for Affine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut first = true;
-        for (symbol, coefficient) in &self.terms {
+        let is_shown =
+            |(symbol, _): &&(IndexSymbol, i64)| !matches!(symbol, IndexSymbol::Within(_));
+        for (symbol, coefficient) in self.terms.iter().filter(is_shown) {
             let sign = if *coefficient < 0 {
                 "-"
             } else if first {

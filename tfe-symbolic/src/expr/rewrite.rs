@@ -359,6 +359,12 @@ pub(crate) fn substitute(affine: &Affine, variable: LoopVariable, value: &Affine
     for (symbol, factor) in &affine.terms {
         let term = match symbol {
             IndexSymbol::Loop(own) if *own == variable => value.clone(),
+            // Inside the innermost loop that is left of it.
+            IndexSymbol::Within(own) if *own == variable => {
+                let left = value.variables().into_iter().max();
+                let symbol = left.map(|left| Affine::symbol(IndexSymbol::Within(left)));
+                symbol.unwrap_or_default()
+            }
             IndexSymbol::Entry(list, place) => {
                 let place = substitute(place, variable, value);
                 Affine::symbol(IndexSymbol::Entry(list.clone(), place))

@@ -217,9 +217,7 @@ impl Lowerer<'_> {
             );
             return false;
         };
-        let fits = beyond.as_constant().is_some_and(|value| value < 0)
-            && low.as_constant().is_some_and(|value| value >= 0);
-        if fits {
+        if is_inside(&low, &beyond) {
             return true;
         }
         let Some(side) = self.always_outside(place, length) else {
@@ -243,6 +241,16 @@ impl Lowerer<'_> {
             },
         );
         false
+    }
+
+    /// Whether the ranges around show an index to stay inside an array.
+    pub(super) fn stays_inside(&self, place: &Affine, length: &Affine) -> bool {
+        let low = self.extreme(place, false);
+        let beyond = self
+            .extreme(place, true)
+            .and_then(|high| high.plus_scaled(length, -1));
+        low.zip(beyond)
+            .is_some_and(|(low, beyond)| is_inside(&low, &beyond))
     }
 
     /// The ranges that an index depends on, as the user wrote them.
@@ -327,7 +335,16 @@ impl Lowerer<'_> {
     /// An index that is beyond the end for small and for large lengths is so in between, because index and length are
     /// affine in each length; an index that changes sides may be inside for some lengths.
     fn always_outside(&self, place: &Affine, length: Option<&Affine>) -> Option<Side> {
-        let needed = self.loops_around(place);
+        self.always_outside_on(&self.loops_around(place), place, length)
+    }
+
+    /// The same on the turns of these loops.
+    pub(super) fn always_outside_on(
+        &self,
+        needed: &[Index],
+        place: &Affine,
+        length: Option<&Affine>,
+    ) -> Option<Side> {
         let bounds = needed.iter().flat_map(|index| [&index.start, &index.end]);
         let affines: Vec<&Affine> = bounds.chain([place]).chain(length).collect();
         let names = generic_lengths(&affines);
@@ -352,7 +369,7 @@ impl Lowerer<'_> {
                 at.map_or(0, |at| lengths[at])
             };
             let mut nest = Nest {
-                indices: &needed,
+                indices: needed,
                 size: &length_of,
                 values: Vec::new(),
                 trips: 0,
@@ -370,7 +387,7 @@ impl Lowerer<'_> {
     }
 
     /// Only the loops on which an index depends, so that long loops beside them do not use up the turns.
-    fn loops_around(&self, place: &Affine) -> Vec<Index> {
+    pub(super) fn loops_around(&self, place: &Affine) -> Vec<Index> {
         let depends = |affine: &Affine, index: &Index| affine.depends_on(index.variable);
         self.indices
             .iter()
@@ -387,8 +404,9 @@ impl Lowerer<'_> {
     }
 }
 
+/// The end beyond which an index is outside its array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
+pub(super) enum Side {
     Below,
     Above,
 }
@@ -488,7 +506,7 @@ impl Nest<'_> {
                         (self.size)(name)
                     }
                     // Indices with entries of lists are left to the run time.
-                    IndexSymbol::Entry(..) => 0,
+                    IndexSymbol::Entry(..) | IndexSymbol::Within(_) => 0,
                 };
                 sum.saturating_add(coefficient.saturating_mul(value))
             })
@@ -526,6 +544,12 @@ impl Nest<'_> {
         }
         found
     }
+}
+
+/// Whether an index stays inside its array: from its least value, and its largest one less the length.
+fn is_inside(low: &Affine, beyond: &Affine) -> bool {
+    beyond.as_constant().is_some_and(|value| value < 0)
+        && low.as_constant().is_some_and(|value| value >= 0)
 }
 
 fn coefficient(affine: &Affine, symbol: &IndexSymbol) -> i64 {

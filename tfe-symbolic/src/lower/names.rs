@@ -291,6 +291,7 @@ impl Lowerer<'_> {
             let Some(place) = self.affine(index) else {
                 return Value::Error;
             };
+            let place = self.kept_inside(place, length.as_ref());
             if !self.in_bounds(name, &place, length.as_ref(), index.span) {
                 return Value::Error;
             }

@@ -1,7 +1,7 @@
 //! Requirements on lengths and indices that are not known here: fields are checked once for each model before it is
 //! evaluated, const parameters where the kernels are compiled for their values.
 
-use super::Lowerer;
+use super::{Index, Lowerer};
 use crate::expr::graph::SumRange;
 use crate::expr::input::{Affine, IndexSymbol};
 use crate::model::declared::{Extent, Requirement};
@@ -32,6 +32,36 @@ impl Lowerer<'_> {
             length,
         };
         self.require(requirement);
+    }
+
+    /// An index as kernels may read it. What does not change from term to term of an inner sum is computed once, before
+    /// that sum, also where the sum is empty. An index that is outside its array on such turns, whatever the lengths, is
+    /// kept inside the sum.
+    pub(super) fn kept_inside(&self, place: Affine, length: Option<&Affine>) -> Affine {
+        let Some(length) = length.filter(|length| !self.stays_inside(&place, length)) else {
+            return place;
+        };
+        let own = self.needed(&place);
+        let is_own = |index: &Index| own.iter().any(|range| range.variable == index.variable);
+        let around = self.loops_around(&place);
+        let inner = around.iter().rev().find(|index| !is_own(index));
+        let (Some(inner), false) = (inner, place.holds_entry()) else {
+            return place;
+        };
+        let on_own: Vec<Index> = around
+            .iter()
+            .filter(|index| is_own(index))
+            .cloned()
+            .collect();
+        let is_outside = |loops: &[Index]| {
+            let side = self.always_outside_on(loops, &place, Some(length));
+            side.is_some()
+        };
+        if !is_outside(&on_own) || is_outside(&around) {
+            return place;
+        }
+        let within = Affine::symbol(IndexSymbol::Within(inner.variable));
+        place.plus_scaled(&within, 1).unwrap_or(place)
     }
 
     /// Notes that an array field has to be as long as its largest index asks for. An index that fields choose says nothing

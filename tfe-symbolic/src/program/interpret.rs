@@ -303,6 +303,7 @@ impl Machine<'_> {
                     *self.loops.get(variable).ok_or(InterpretError::Unassigned)?
                 }
                 IndexSymbol::Entry(name, place) => self.entry_of(name, place)?,
+                IndexSymbol::Within(_) => 0,
                 IndexSymbol::ConstParameter(name) | IndexSymbol::Field(name) => {
                     let size = self.environment.sizes.get(name);
                     *size.ok_or_else(|| InterpretError::Missing { name: name.clone() })?

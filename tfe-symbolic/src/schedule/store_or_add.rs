@@ -203,8 +203,10 @@ impl Turns {
 fn value(affine: &Affine, values: &Values) -> Option<i64> {
     let mut total = affine.constant;
     for (symbol, factor) in &affine.terms {
-        let IndexSymbol::Loop(variable) = symbol else {
-            return None;
+        let variable = match symbol {
+            IndexSymbol::Loop(variable) => variable,
+            IndexSymbol::Within(_) => continue,
+            _ => return None,
         };
         let (_, value) = values.iter().rev().find(|(known, _)| known == variable)?;
         total = total.checked_add(value.checked_mul(*factor)?)?;

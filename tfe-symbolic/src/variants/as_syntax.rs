@@ -185,6 +185,7 @@ fn affine(index: &Affine) -> Expr {
             IndexSymbol::Loop(variable) => name(&variable.to_string()),
             IndexSymbol::ConstParameter(own) | IndexSymbol::Field(own) => name(own),
             IndexSymbol::Entry(list, place) => element(name(list), place),
+            IndexSymbol::Within(_) => continue,
         };
         let multiple = |factor: i64| match factor {
             1 => symbol.clone(),

@@ -107,7 +107,7 @@ impl Used {
                     self.0.insert(list.clone());
                     self.index(place);
                 }
-                IndexSymbol::Loop(_) | IndexSymbol::ConstParameter(_) => {}
+                IndexSymbol::Loop(_) | IndexSymbol::ConstParameter(_) | IndexSymbol::Within(_) => {}
             }
         }
     }
@@ -117,7 +117,7 @@ impl Used {
         index.terms.iter().all(|(symbol, _)| match symbol {
             IndexSymbol::Field(name) => self.0.contains(name),
             IndexSymbol::Entry(list, place) => self.0.contains(list) && self.has_fields_of(place),
-            IndexSymbol::Loop(_) | IndexSymbol::ConstParameter(_) => true,
+            IndexSymbol::Loop(_) | IndexSymbol::ConstParameter(_) | IndexSymbol::Within(_) => true,
         })
     }
 
