@@ -123,6 +123,41 @@ fn lengths_of_outputs_are_checked() {
     assert!(huge.length(0.0, &Q, &V).is_err());
 }
 
+/// The last w sites, of which there may be fewer; and a sum over their indices, in which they need not exist.
+#[test]
+fn sites_below_zero_are_told() {
+    #[dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, dot(q[i])^2/2 - q[i]^2/2),
+        output(late[i in n-w..n]) = i*q[0],
+        output(places) = sum(i in n-back..n, i*q[0]),
+    )]
+    struct Late {
+        n: usize,
+        w: usize,
+        back: usize,
+    }
+    let late = |n, w, back| Late { n, w, back };
+    let (q, v) = ([0.5; 2], [0.0; 2]);
+    let found = late(2, 2, 4);
+    close(&found.late(0.0, &q, &v).expect("two sites"), &[0.0, 0.5]);
+    // (−2 − 1 + 0 + 1) q
+    close(&[found.places(0.0, &q, &v).expect("a sum")], &[-1.0]);
+    let wrong = late(2, 3, 4);
+    let error = wrong.late(0.0, &q, &v).expect_err("no third site");
+    let expected = family::ModelError::Index {
+        array: "late",
+        index: "n-w",
+        ranges: "output(late[i in n-w..n])",
+        value: -1,
+        length: 2,
+    };
+    assert_eq!(error, expected);
+    let run = Simulation::new(&wrong).step(0.1);
+    let run = run.run(wrong.state(q, v), 0.0..1.0).expect_err("no third");
+    assert_eq!(run.kind(), &tfe::RunErrorKind::Family(expected));
+}
+
 /// Outputs named like methods; the kernels must not call these.
 #[test]
 fn outputs_may_be_called_like_parts_of_the_kernel() {

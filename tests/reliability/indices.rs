@@ -322,6 +322,29 @@ fn lengths_of_vectors_are_checked() {
     assert_eq!(stepper.err(), Some(error));
 }
 
+/// Where an index is only a number, a sum has its terms below zero, too.
+#[test]
+fn sums_over_indices_that_stand_nowhere_have_all_their_terms() {
+    #[dynamics(
+        coordinates(x),
+        lagrangian = dot(x)^2/2 - x^2/2,
+        output(five) = sum(i in n-5..n, i*x),
+        output(all) = sum(i in n-w..n, i*x),
+    )]
+    struct Last {
+        n: usize,
+        w: usize,
+    }
+    for (n, w) in [(0, 0), (0, 3), (2, 4), (3, 1), (7, 20)] {
+        let last = Last { n, w };
+        assert_eq!(last.check(), Ok(()));
+        let sum = |terms: i64| (n as i64 - terms..n as i64).sum::<i64>() as f64;
+        // Whole numbers.
+        assert_eq!(last.five(0.0, [2.0], [0.0]), 2.0 * sum(5), "{n}");
+        assert_eq!(last.all(0.0, [2.0], [0.0]), 2.0 * sum(w as i64), "{n} {w}");
+    }
+}
+
 /// The last mass has no neighbour, and the sum over those after it no terms.
 #[test]
 fn nothing_is_read_for_sums_without_terms() {
