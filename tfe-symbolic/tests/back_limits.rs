@@ -289,6 +289,45 @@ fn powers_of_distances_at_zero() {
     }
 }
 
+/// Potentials hⁿ of h = hypot(u, v), u = x + y, v = x − 2 y: with w = u u′ + v v′, forces −n hⁿ⁻² w and tangents
+/// −n hⁿ⁻² (u′ u′ + v′ v′ + (n − 2) w w/h²).
+#[test]
+fn powers_of_hypot_of_sums_at_zero() {
+    let slopes = [[1.0, 1.0], [1.0, -2.0]];
+    let product = |i: usize, j: usize| slopes[0][i] * slopes[0][j] + slopes[1][i] * slopes[1][j];
+    for (exponent, n) in [
+        ("2", 2.0),
+        ("2.3", 2.3),
+        ("2.5", 2.5),
+        ("3", 3.0),
+        ("5", 5.0),
+    ] {
+        let energy = format!("hypot(x + y, x - 2*y)^{exponent}");
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
+        let found = results_of(&text, &[], ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.q, [0.0; 2], "{energy}");
+        for i in 0..2 {
+            for j in 0..2 {
+                // A quadratic energy has the same tangent everywhere.
+                let expected = if n > 2.0 { 0.0 } else { -2.0 * product(i, j) };
+                assert_eq!(found.qq[i][j], expected, "{energy}");
+            }
+        }
+        let found = results_of(&text, &[], ALL, &[3.0, 1.0], &[0.0; 2]);
+        let (u, v) = (4.0, 1.0);
+        let h = f64::hypot(u, v);
+        let w = [0, 1].map(|i| u * slopes[0][i] + v * slopes[1][i]);
+        let factor = -n * h.powf(n - 2.0);
+        for i in 0..2 {
+            close(found.q[i], factor * w[i], &energy);
+            for j in 0..2 {
+                let tangent = product(i, j) + (n - 2.0) * w[i] * w[j] / (h * h);
+                close(found.qq[i][j], factor * tangent, &energy);
+            }
+        }
+    }
+}
+
 /// Powers of squares with an exponent that is a field: the force −2 k c (k u)ᶜ⁻¹ x vanishes with u = x² + y² where c is one half or more.
 #[test]
 fn powers_of_squares_at_zero() {

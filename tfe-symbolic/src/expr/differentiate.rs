@@ -94,6 +94,12 @@ impl Forward {
                 let (a, b) = (self.of(x), self.of(y));
                 self.chosen(graph, (function.takes_first(), x, y), a, b)
             }
+            Node::Call {
+                function: Function::Hypot,
+                arguments,
+            } if arguments.iter().all(|x| self.of(*x).is_some()) => {
+                Some(self.rate_of_hypot(graph, id, arguments))
+            }
             Node::Loop { range, body } => {
                 let body = self.of(*body)?;
                 Some(graph.sum(range.clone(), body))
@@ -110,6 +116,18 @@ impl Forward {
                 (!terms.is_empty()).then(|| graph.linear(Constant::ZERO, &terms))
             }
         }
+    }
+
+    /// (x ẋ + y ẏ)/h of h = hypot(x, y): one quotient, as of √(x² + y²), so that powers of h beside it are divided by it.
+    fn rate_of_hypot(&self, graph: &mut Graph, h: ExprId, arguments: &[ExprId]) -> ExprId {
+        let mut terms = Vec::with_capacity(arguments.len());
+        for x in arguments {
+            if let Some(rate) = self.of(*x) {
+                terms.push((Constant::ONE, graph.multiply(*x, rate)));
+            }
+        }
+        let above = graph.linear(Constant::ZERO, &terms);
+        graph.divide(above, h)
     }
 
     fn chosen(
