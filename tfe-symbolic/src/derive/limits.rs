@@ -3,14 +3,19 @@
 //! ```text
 //! m = max(x, 0)        ∂²(m √m)/∂x² = 3/(4 √m) { 1  where x ≥ 0;  0  elsewhere }  →  { 3/(4 √m)  where x ≥ 0;  0  elsewhere }
 //! h = √(x² + y²)       ∂²h³/∂x∂y = 3 x y/h                                        →  3 x y/{ 1  where h ≤ 0;  h  elsewhere }
+//!                      x ln h                                                     →  x ln { 1  where h ≤ 0;  h  elsewhere }
 //! xⁿ                   ∂xⁿ/∂x = n xⁿ⁻¹                                            →  { 0  where n = 0;  n xⁿ⁻¹  elsewhere }
 //! ```
 //!
 //! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
 //! are treated in `norms.rs`. A whole exponent is an index, as in `sum(i in 0..N, a[i]*x^i)`, or a length. This is done
-//! to the entries as a last step, after factors have been combined, so that m/√m is √m and no choice is needed.
+//! to the entries as a last step, after factors have been combined, so that m/√m is √m and no choice is needed. Energies
+//! and outputs have the limits of norms only.
 
+mod facts;
+mod norm;
 mod norms;
+mod powers;
 
 use crate::derive::entry::Entry;
 use crate::expr::comparison::Comparison;
@@ -20,21 +25,44 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::Input;
 use crate::expr::rewrite::Mapping;
 use crate::program::Array;
+use facts::{is_surely_positive, moves};
 use norms::Norms;
 
 /// The depth to which factors are searched for values that may be infinite.
 const MAX_DEPTH: usize = 4;
 
-/// Rewrites derivatives and forces so that they have their limits; products without a limit are unchanged.
+/// Rewrites entries so that they have their limits; products without a limit are unchanged.
 pub(crate) fn take_limits<'a>(
     graph: &mut Graph,
     lists: impl IntoIterator<Item = &'a mut Vec<Entry>>,
 ) {
-    let is_slope = |entry: &&mut Entry| is_slope(entry.place.array);
-    let mut entries: Vec<&mut Entry> = lists.into_iter().flatten().filter(is_slope).collect();
+    let (mut slopes, mut values) = (Vec::new(), Vec::new());
+    for entry in lists.into_iter().flatten() {
+        if is_slope(entry.place.array) {
+            slopes.push(entry);
+        } else if is_value(entry.place.array) {
+            values.push(entry);
+        }
+    }
+    let mut norms = Norms::default();
+    rewrite(graph, slopes, &mut |graph, product| {
+        let product = norms.limit(graph, product);
+        let product = inside_choices(graph, product);
+        where_exponents_vanish(graph, product)
+    });
+    rewrite(graph, values, &mut |graph, product| {
+        norms.limit(graph, product)
+    });
+}
+
+/// Rewrites the products in entries, children first.
+fn rewrite(
+    graph: &mut Graph,
+    entries: Vec<&mut Entry>,
+    limit: &mut dyn FnMut(&mut Graph, ExprId) -> ExprId,
+) {
     let roots: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
     let mut mapping = Mapping::default();
-    let mut norms = Norms::default();
     for old in graph.reachable(&roots) {
         let node = graph.node(old);
         let is_product = matches!(node, Node::Product(_));
@@ -48,13 +76,11 @@ pub(crate) fn take_limits<'a>(
             new = graph.remake(&node, &mapping);
         }
         if is_product {
-            new = norms.limit(graph, new);
-            new = inside_choices(graph, new);
-            new = where_exponents_vanish(graph, new);
+            new = limit(graph, new);
         }
         mapping.set(old, new);
     }
-    for entry in &mut entries {
+    for entry in entries {
         entry.value = mapping.of(entry.value);
     }
 }
@@ -71,6 +97,14 @@ fn is_slope(array: Array) -> bool {
             | Array::QQ
             | Array::ForceZ
             | Array::ForceQ
+    )
+}
+
+/// Energies and outputs.
+fn is_value(array: Array) -> bool {
+    matches!(
+        array,
+        Array::Value | Array::Observable(_) | Array::SiteObservable
     )
 }
 
@@ -188,7 +222,7 @@ fn where_exponents_vanish(graph: &mut Graph, x: ExprId) -> ExprId {
     }
     let is_power = |(y, n): &(ExprId, i32)| match graph.node(*y) {
         Node::Power { base, exponent } => {
-            *n > 0 && is_whole(graph, *exponent) && !graph.inputs_of(*base).iter().all(is_at_rest)
+            *n > 0 && is_whole(graph, *exponent) && moves(graph, *base)
         }
         _ => false,
     };
@@ -223,13 +257,6 @@ fn where_exponents_vanish(graph: &mut Graph, x: ExprId) -> ExprId {
 fn is_whole(graph: &Graph, x: ExprId) -> bool {
     let inputs = graph.inputs_of(x);
     !inputs.is_empty() && (inputs.iter()).all(|input| matches!(input, Input::Integer(_)))
-}
-
-fn is_at_rest(input: &Input) -> bool {
-    matches!(
-        input,
-        Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_)
-    )
 }
 
 /// Whether xⁿ may be infinite where something in it vanishes.
@@ -278,16 +305,4 @@ fn may_be_infinite(graph: &Graph, x: ExprId, n: i32, depth: usize) -> bool {
         }
         _ => false,
     }
-}
-
-/// Whether it is a positive number, or a sum of a positive number and non-negative terms, as 1 + x².
-fn is_surely_positive(graph: &Graph, x: ExprId) -> bool {
-    let is_positive = |c: Constant| !c.is_zero() && !c.is_negative();
-    if let Some(number) = graph.as_constant(x) {
-        return is_positive(number);
-    }
-    let (_, x) = graph.as_multiple(x);
-    graph.as_sum(x).is_some_and(|(constant, terms)| {
-        is_positive(constant) && terms.iter().all(|(c, _)| is_positive(*c))
-    })
 }

@@ -50,12 +50,14 @@ impl Derivation {
     /// ```
     pub fn hamiltonian(declared: &Declared) -> Option<Program> {
         let transformation = declared.time_transformation?;
-        let entry = Entry {
+        let mut graph = declared.graph.clone();
+        let mut entries = vec![Entry {
             nest: Vec::new(),
             place: Place::scalar(Array::Value),
             value: transformation.hamiltonian,
-        };
-        Some(Draft::best(&declared.graph, vec![vec![entry]], Passes::ALL))
+        }];
+        take_limits(&mut graph, [&mut entries]);
+        Some(Draft::best(&graph, vec![entries], Passes::ALL))
     }
 
     fn program_of(&self, is_wanted: impl Fn(Array) -> bool) -> Program {

@@ -1,0 +1,59 @@
+//! What limits ask of expressions.
+
+use crate::expr::constant::Constant;
+use crate::expr::function::Function;
+use crate::expr::graph::{ExprId, Graph, Node};
+use crate::expr::input::Input;
+
+/// The factors of an expression without its number.
+pub(super) fn factors_of(graph: &Graph, x: ExprId) -> Vec<(ExprId, i32)> {
+    let x = graph.as_multiple(x).1;
+    match graph.node(x) {
+        Node::Product(factors) => factors.clone(),
+        _ => vec![(x, 1)],
+    }
+}
+
+/// u of ln u.
+pub(super) fn argument_of_logarithm(graph: &Graph, x: ExprId) -> Option<ExprId> {
+    match graph.node(x) {
+        Node::Call {
+            function: Function::Ln,
+            arguments,
+        } => arguments.first().copied(),
+        _ => None,
+    }
+}
+
+/// Whether an expression is a field, or an element of one.
+pub(super) fn is_field(graph: &Graph, x: ExprId) -> bool {
+    matches!(
+        graph.node(x),
+        Node::Input(Input::Parameter(_) | Input::ParameterElement(..))
+    )
+}
+
+/// Whether an input never changes during a motion.
+pub(super) fn is_at_rest(input: &Input) -> bool {
+    matches!(
+        input,
+        Input::Parameter(_) | Input::ParameterElement(..) | Input::Integer(_)
+    )
+}
+
+/// Whether an expression may change during a motion.
+pub(super) fn moves(graph: &Graph, x: ExprId) -> bool {
+    !graph.inputs_of(x).iter().all(is_at_rest)
+}
+
+/// Whether it is a positive number, or a sum of a positive number and non-negative terms, as 1 + x².
+pub(super) fn is_surely_positive(graph: &Graph, x: ExprId) -> bool {
+    let is_positive = |c: Constant| !c.is_zero() && !c.is_negative();
+    if let Some(number) = graph.as_constant(x) {
+        return is_positive(number);
+    }
+    let (_, x) = graph.as_multiple(x);
+    graph.as_sum(x).is_some_and(|(constant, terms)| {
+        is_positive(constant) && terms.iter().all(|(c, _)| is_positive(*c))
+    })
+}

@@ -1,0 +1,134 @@
+//! Limits of products in one norm: of those that vanish with it, and of those with powers of it whose exponent is not
+//! known.
+
+use super::norm::{MAX_DEPTH, MAX_SUMS, Norm};
+use crate::expr::comparison::Comparison;
+use crate::expr::constant::Constant;
+use crate::expr::graph::{ExprId, Graph, Node};
+
+/// Degrees are sums of exponents, which may have rounding errors.
+const ROUNDING: f64 = 1e-6;
+
+impl Norm {
+    /// The product with this norm replaced by one where both vanish; `None` where the product is unchanged.
+    pub(super) fn limit(&self, graph: &mut Graph, factors: &[(ExprId, i32)]) -> Option<ExprId> {
+        let unknown = |(x, n): &(ExprId, i32)| match graph.node(*x) {
+            Node::Power { base, exponent } if *n == 1 => {
+                let is_number = graph.as_constant(*exponent).is_some();
+                let (coefficient, inner) = graph.as_multiple(*base);
+                let is_own = Some(inner) == self.root || Some(inner) == self.square;
+                let is_known = is_number || coefficient.is_negative();
+                (is_own && !is_known).then_some((*x, *base, *exponent))
+            }
+            _ => None,
+        };
+        let mut unknown = factors.iter().filter_map(unknown);
+        if let Some((power, base, exponent)) = unknown.next() {
+            if unknown.next().is_some() {
+                return None;
+            }
+            let rest: Vec<(ExprId, i32)> = factors
+                .iter()
+                .filter(|(x, _)| *x != power)
+                .copied()
+                .collect();
+            return self.limit_of_power(graph, (base, exponent), &rest);
+        }
+        let mut all = factors.iter();
+        let diverges = all.any(|factor| self.diverges(graph, *factor, MAX_SUMS));
+        let degree = self.degree_of_product(graph, factors, MAX_DEPTH);
+        if !diverges || degree <= ROUNDING {
+            return None;
+        }
+        let mut limit = Vec::with_capacity(factors.len());
+        for (x, n) in factors {
+            limit.push((self.made_finite(graph, (*x, *n), MAX_SUMS), *n));
+        }
+        Some(graph.product(Constant::ONE, &limit))
+    }
+
+    /// t hᵉ with an exponent that is not known: (t/hᵐ) hᵉ⁺ᵐ with t/hᵐ of degree zero. That is zero, or infinite, with the power alone.
+    ///
+    /// Of t (h²)ᵉ with t of odd degree, where no root of h² is at hand, one degree is left beside the power.
+    fn limit_of_power(
+        &self,
+        graph: &mut Graph,
+        (base, exponent): (ExprId, ExprId),
+        factors: &[(ExprId, i32)],
+    ) -> Option<ExprId> {
+        let inner = graph.as_multiple(base).1;
+        let is_root = Some(inner) == self.root;
+        let (mut rest, mut shift) = (Vec::new(), 0);
+        for (x, n) in factors {
+            // In units of the root.
+            let unit = if Some(*x) == self.root {
+                1
+            } else if Some(*x) == self.square {
+                2
+            } else if self.own_degree(graph, *x, MAX_DEPTH).is_some() {
+                return None;
+            } else {
+                rest.push((*x, *n));
+                continue;
+            };
+            if *x != base && !(self.is_plain && inner == base) {
+                return None;
+            }
+            shift += unit * i64::from(*n);
+        }
+        let degree = self.degree_of_product(graph, &rest, MAX_DEPTH);
+        let above = degree as i64;
+        let is_whole = degree == above as f64 && (0..=i64::from(u16::MAX)).contains(&above);
+        let is_divided = shift < 0 || (shift == 0 && !is_root && above >= 1);
+        if !is_whole || !is_divided {
+            return None;
+        }
+        let is_single = shift == 0 && above == 1;
+        if is_single && self.root.is_some() {
+            // Beside a root of the norm, as of an attraction, zero is a singular point as a rule.
+            return None;
+        }
+        let root = self.root.filter(|_| self.is_plain && inner == base);
+        let (divisor, times, left) = match (is_root, root) {
+            (true, _) => (base, above, 0),
+            (false, Some(root)) if above % 2 == 1 => (root, above, 0),
+            (false, _) => (base, above / 2, above % 2),
+        };
+        let units = if is_root { 1 } else { 2 };
+        let added = Constant::rational(i128::from(shift + above - left), units)?;
+        let (number, terms) = graph.terms(exponent);
+        let number = number + added;
+        let mut raised = base;
+        if left == 1 {
+            // A potential (h²)⁻ᵉ has no limit.
+            let may_be_large = terms.iter().any(|(c, _)| !c.is_negative());
+            if !may_be_large || (is_single && !number.is_negative()) {
+                return None;
+            }
+        }
+        let exponent = graph.linear(number, &terms);
+        if left == 1 && number.is_negative() {
+            raised = self.one_where_root_vanishes(graph, base, exponent);
+        }
+        rest.push((graph.power(raised, exponent), 1));
+        if times > 0 {
+            let divisor = self.one_where_zero(graph, divisor);
+            rest.push((divisor, -i32::try_from(times).ok()?));
+        }
+        Some(graph.product(Constant::ONE, &rest))
+    }
+
+    /// A square below one of the xᵢ, as x (h²)ᵉ, with one where it is zero, if the product with that is zero with it: where the exponent is −½ or more.
+    fn one_where_root_vanishes(
+        &self,
+        graph: &mut Graph,
+        square: ExprId,
+        exponent: ExprId,
+    ) -> ExprId {
+        let [zero, one, two] = [0, 1, 2].map(|number| graph.integer(number));
+        let half = graph.divide(one, two);
+        let least = graph.negate(half);
+        let at_zero = graph.select(Comparison::LessOrEqual, least, exponent, one, zero);
+        self.elsewhere(graph, square, at_zero)
+    }
+}

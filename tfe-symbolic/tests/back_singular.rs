@@ -1,0 +1,127 @@
+//! Values and derivatives at singular points of the functions in a formula, where what it describes is not singular:
+//! beside closed forms.
+
+mod kernels;
+
+use kernels::results_of;
+use tfe_symbolic::program::Request;
+
+const ALL: Request = Request {
+    value: true,
+    first: true,
+    mass: true,
+    second: true,
+    observables: true,
+    constraint_values: false,
+    constraint_rows: false,
+    constraint_second: false,
+};
+
+/// Up to some hundred roundings: sums cancel little where these are evaluated.
+#[track_caller]
+fn close(found: f64, expected: f64, what: &str) {
+    assert!(
+        (found - expected).abs() <= 1e-13 * expected.abs(),
+        "{what}: {found}, {expected}"
+    );
+}
+
+/// Value, first and second derivative of a potential of one coordinate, as many as are given.
+#[track_caller]
+fn check(energy: &str, parameters: &[(&str, f64)], x: f64, expected: &[f64]) {
+    let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+    let found = results_of(&text, parameters, ALL, &[x], &[0.0]);
+    let found = [-found.value, -found.q[0], -found.qq[0][0]];
+    for (found, expected) in found.into_iter().zip(expected) {
+        close(found, *expected, &format!("{energy} at {x}"));
+    }
+}
+
+/// A logarithm times something that vanishes with its argument. The slope of x ln |x| is infinite at zero.
+#[test]
+fn logarithms_of_one_coordinate_at_zero() {
+    let l = 2_f64.ln();
+    let cases: &[(&str, f64, &[f64])] = &[
+        ("x*ln(abs(x))", 0.0, &[0.0]),
+        ("x*ln(abs(x))", -2.0, &[-2.0 * l, l + 1.0, -0.5]),
+        ("x^2*ln(abs(x))", 0.0, &[0.0, 0.0]),
+        (
+            "x^2*ln(abs(x))",
+            -2.0,
+            &[4.0 * l, -4.0 * l - 2.0, 2.0 * l + 3.0],
+        ),
+        ("x^2*ln(x^2)", 0.0, &[0.0, 0.0]),
+        ("x^2*ln(x)^2", 0.0, &[0.0, 0.0]),
+        ("x^3*ln(x)", 0.0, &[0.0, 0.0, 0.0]),
+        ("x^3*ln(abs(x))", 0.0, &[0.0, 0.0, 0.0]),
+        (
+            "x^3*ln(abs(x))",
+            -2.0,
+            &[-8.0 * l, 12.0 * l + 4.0, -12.0 * l - 10.0],
+        ),
+        ("x^3*(ln(abs(x)/3) - 1)", 0.0, &[0.0, 0.0, 0.0]),
+        ("(x - 1)^3*ln(abs(x - 1)/2)", 1.0, &[0.0, 0.0, 0.0]),
+        ("(1 - x)^3*ln(1 - x)", 1.0, &[0.0, 0.0, 0.0]),
+        (
+            "(1 - x)^3*ln(1 - x)",
+            -1.0,
+            &[8.0 * l, -12.0 * l - 4.0, 12.0 * l + 10.0],
+        ),
+        ("sin(x)^3*ln(abs(sin(x)))", 0.0, &[0.0, 0.0, 0.0]),
+        ("max(x, 0)^3*ln(max(x, 0))", 0.0, &[0.0, 0.0, 0.0]),
+        ("max(x, 0)^3*ln(max(x, 0))", -1.0, &[0.0, 0.0, 0.0]),
+        ("x^3/abs(x)", 0.0, &[0.0, 0.0]),
+    ];
+    for (energy, x, expected) in cases {
+        check(energy, &[], *x, expected);
+    }
+    // What has no value keeps none.
+    let text = "coordinates(x), lagrangian = dot(x)^2/2 - x*ln(x)";
+    let found = results_of(text, &[], ALL, &[-1.0], &[0.0]);
+    assert!(found.value.is_nan() && found.q[0].is_nan());
+    let text = "coordinates(x), lagrangian = dot(x)^2/2, force(x) = -dot(x)*ln(dot(x)^2 + x^2), output(entropy) = x*ln(abs(x))";
+    let found = results_of(text, &[], ALL, &[0.0], &[0.0]);
+    assert_eq!((found.force[0], found.observables[0]), (0.0, 0.0));
+}
+
+/// Potentials u ln u of u = x² + y², with the forces −2 x (ln u + 1), and others.
+#[test]
+fn logarithms_of_distances_at_zero() {
+    let of = |energy: &str, q: [f64; 2]| {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
+        let parameters: &[_] = match energy.contains('a') {
+            true => &[("a", 2.0)],
+            false => &[],
+        };
+        results_of(&text, parameters, ALL, &q, &[0.0; 2])
+    };
+    for (energy, has_tangent) in [
+        ("x^2*ln(x^2 + y^2)", false),
+        ("(x^2 + y^2)*ln(x^2 + y^2)", false),
+        ("(x^2 + y^2)*(ln((x^2 + y^2)/a^2) - 1)", false),
+        ("hypot(x, y)^2*ln(hypot(x, y)/a)", false),
+        ("(x^2 + y^2)*ln(hypot(x, y))", false),
+        ("x^4*ln(x^2 + y^2)", true),
+        ("(x^2 + y^2)^2*ln(x^2 + y^2)", true),
+        ("norm([x, y])^3*ln(norm([x, y])/a)", true),
+        ("norm([x, y])^4*(ln(norm([x, y])/a) - 1/4)", true),
+    ] {
+        let found = of(energy, [0.0; 2]);
+        assert_eq!(found.value, 0.0, "{energy}");
+        assert_eq!(found.q, [0.0; 2], "{energy}");
+        if has_tangent {
+            assert_eq!(found.qq.concat(), [0.0; 4], "{energy}");
+        }
+    }
+    let l = 25_f64.ln();
+    for energy in [
+        "(x^2 + y^2)*ln(x^2 + y^2)",
+        "2*hypot(x, y)^2*ln(hypot(x, y))",
+    ] {
+        let found = of(energy, [3.0, 4.0]);
+        close(-found.value, 25.0 * l, energy);
+        close(-found.q[0], 6.0 * (l + 1.0), energy);
+        close(-found.qq[0][0], 2.0 * (l + 1.0) + 36.0 / 25.0, energy);
+        close(-found.qq[0][1], 48.0 / 25.0, energy);
+    }
+}
