@@ -336,6 +336,8 @@ impl<S: Differentiable> Real for Dual<S> {
     fn powf(self, exponent: Self) -> Self {
         let value = Real::powf(self.value, exponent.value);
         let by_base = exponent.value * Real::powf(self.value, exponent.value - number(1.0));
+        // x⁰ is constant: at zero its slope would be zero times infinity.
+        let by_base = unless_zero(self.value.abs() + exponent.value.abs(), by_base);
         let mut result = self.chain(value, by_base);
         // Where the power vanishes, the logarithm is infinite and the slope zero.
         let by_exponent = unless_zero(value, value * Real::ln(self.value));
@@ -430,6 +432,14 @@ mod tests {
                 (found - exact).abs() < 4.0 * f64::EPSILON,
                 "{name}: {found}"
             );
+        }
+    }
+
+    #[test]
+    fn a_power_with_exponent_zero_has_no_slope() {
+        for x in [0.0, 2.0] {
+            let power = Real::powf(Dual::new(x, 1.0), Dual::from_f64(0.0));
+            assert_eq!((power.value, power.slope), (1.0, 0.0));
         }
     }
 

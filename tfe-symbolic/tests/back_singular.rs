@@ -125,3 +125,73 @@ fn logarithms_of_distances_at_zero() {
         close(-found.qq[0][1], 48.0 / 25.0, energy);
     }
 }
+
+/// Powers with a field as exponent: derivatives with the factors e, e − 1, … are zero at zero where these are.
+#[test]
+fn fields_as_exponents_at_zero() {
+    for (energy, e, expected) in [
+        ("x^e", 0.0, [1.0, 0.0, 0.0]),
+        ("x^e", 1.0, [0.0, 1.0, 0.0]),
+        ("x^e", 2.0, [0.0, 0.0, 2.0]),
+        ("x^e", 3.0, [0.0, 0.0, 0.0]),
+        ("3*x^e/e", 1.0, [0.0, 3.0, 0.0]),
+        ("(x/4)^e", 1.0, [0.0, 0.25, 0.0]),
+        ("x^(2*e)", 0.5, [0.0, 1.0, 0.0]),
+        ("x^(e + 1)/(e + 1)", 0.0, [0.0, 1.0, 0.0]),
+        ("sin(x)^e*cos(x)", 1.0, [0.0, 1.0, 0.0]),
+        ("max(x, 0)^e", 1.0, [0.0, 1.0, 0.0]),
+        ("abs(x)^e*x", 0.0, [0.0, 1.0, 0.0]),
+    ] {
+        check(energy, &[("e", e)], 0.0, &expected);
+    }
+    for (energy, x, expected) in [
+        ("x^e", 4.0, [8.0, 3.0, 0.375]),
+        ("max(x, 0)^e", 4.0, [8.0, 3.0, 0.375]),
+        ("max(x, 0)^e", -1.0, [0.0, 0.0, 0.0]),
+    ] {
+        check(energy, &[("e", 1.5)], x, &expected);
+    }
+    // The force of a contact with e = 1, a linear spring, and its tangent where it closes.
+    let text = "coordinates(y), lagrangian = dot(y)^2/2, force(y) = max(-y, 0)^e*(1 - dot(y)/2)";
+    let found = results_of(text, &[("e", 1.0)], ALL, &[0.0], &[-0.4]);
+    assert_eq!((found.force[0], found.force_z[0][0]), (0.0, 0.0));
+    close(found.force_q[0][0], -1.2, "by y");
+    let found = results_of(text, &[("e", 1.5)], ALL, &[1.0], &[-0.4]);
+    assert_eq!((found.force[0], found.force_q[0][0]), (0.0, 0.0));
+}
+
+/// Energies hᵉ with e = 2 are quadratic, and drag hᵉ⁻² v with e = 2 is linear.
+#[test]
+fn fields_as_exponents_of_distances() {
+    for (square, [xx, xy, yy]) in [
+        ("norm([x, y])", [2.0, 0.0, 2.0]),
+        ("hypot(x, y)", [2.0, 0.0, 2.0]),
+        ("norm([2*x, y])", [8.0, 0.0, 2.0]),
+        ("norm([x, y, 3*x])", [20.0, 0.0, 2.0]),
+        ("hypot(x + y, x - 2*y)", [4.0, -2.0, 10.0]),
+    ] {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {square}^e");
+        for q in [[0.0, 0.0], [3.0, 4.0]] {
+            let found = results_of(&text, &[("e", 2.0)], ALL, &q, &[0.0; 2]);
+            close(-found.qq[0][0], xx, square);
+            close(-found.qq[1][1], yy, square);
+            // The terms of the entry that is zero cancel.
+            assert!((-found.qq[0][1] - xy).abs() <= 1e-14 * xx, "{square}");
+        }
+        let found = results_of(&text, &[("e", 3.0)], ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.qq.concat(), [0.0; 4], "{square}");
+    }
+    let h = "norm([dot(x), dot(y)])";
+    for (parts, e) in [
+        (format!("dissipation = c*{h}^e/e"), 2.0),
+        (
+            format!("force(x) = -c*{h}^e*dot(x), force(y) = -c*{h}^e*dot(y)"),
+            0.0,
+        ),
+    ] {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2, {parts}");
+        let found = results_of(&text, &[("c", 0.3), ("e", e)], ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.force, [0.0; 2], "{parts}");
+        assert_eq!(found.force_z.concat(), [-0.3, 0.0, 0.0, -0.3], "{parts}");
+    }
+}

@@ -117,7 +117,14 @@ impl Real for Taped<'_> {
         self.one(|x| Real::powi(x, exponent), slope)
     }
     fn powf(self, exponent: Self) -> Self {
-        let by_base = |x: f64, y: f64, _: f64| y * Real::powf(x, y - 1.0);
+        // x⁰ is constant: at zero its slope would be zero times infinity.
+        let by_base = |x: f64, y: f64, _: f64| {
+            if x == 0.0 && y == 0.0 {
+                0.0
+            } else {
+                y * Real::powf(x, y - 1.0)
+            }
+        };
         // Where the power vanishes, the logarithm is infinite and the slope zero.
         let by_exponent = |x: f64, _: f64, power: f64| {
             if power == 0.0 {
@@ -266,6 +273,7 @@ mod tests {
         let of_root = by_parameter(0.25, |a| (a * Taped::of(x)).sqrt());
         let of_length = by_parameter(0.25, |a| (a * Taped::of(x)).hypot(a * Taped::of(x)));
         assert_eq!(by_parameter(0.0, |a| a.hypot(Taped::of(ZERO))), ZERO);
+        assert_eq!(by_parameter(0.0, |a| a.powf(Taped::of(ZERO))), ZERO);
         for lane in 0..LANES {
             // xᵃ ln x, ½ √(x/a) and √2 x
             let x: f64 = x[lane];

@@ -8,10 +8,10 @@
 //! ```
 //!
 //! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
-//! are treated in `norms.rs`. A whole exponent is an index, as in `sum(i in 0..N, a[i]*x^i)`, or a length. This is done
-//! to the entries as a last step, after factors have been combined, so that m/√m is √m and no choice is needed. Energies
-//! and outputs have the limits of norms only.
+//! are treated in `norms.rs`, exponents in `exponents.rs`. This is done to the entries as a last step, after factors have
+//! been combined, so that m/√m is √m and no choice is needed. Energies and outputs have the limits of norms only.
 
+mod exponents;
 mod facts;
 mod norm;
 mod norms;
@@ -22,10 +22,10 @@ use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
-use crate::expr::input::Input;
 use crate::expr::rewrite::Mapping;
 use crate::program::Array;
-use facts::{is_surely_positive, moves};
+use exponents::where_exponents_vanish;
+use facts::is_surely_positive;
 use norms::Norms;
 
 /// The depth to which factors are searched for values that may be infinite.
@@ -201,62 +201,13 @@ fn inside_choices(graph: &mut Graph, x: ExprId) -> ExprId {
             let inside: Vec<(ExprId, i32)> = factors.iter().map(inside).collect();
             let value = graph.product(coefficient, &inside);
             let value = inside_choices(graph, value);
+            let value = where_exponents_vanish(graph, value);
             let (number, value) = graph.as_multiple(value);
             let chosen = choice.with(graph, value);
             return graph.scale(number, chosen);
         }
     }
     x
-}
-
-/// A product with zero in place of n (n − 1) … xⁿ⁻ᵏ where its integer factors vanish: with a negative exponent the
-/// power is infinite at zero.
-fn where_exponents_vanish(graph: &mut Graph, x: ExprId) -> ExprId {
-    let (coefficient, product) = graph.as_multiple(x);
-    let Node::Product(factors) = graph.node(product) else {
-        return x;
-    };
-    let mut kinds = factors.iter().map(|(y, _)| graph.node(*y));
-    if !kinds.any(|node| matches!(node, Node::Power { .. })) {
-        return x;
-    }
-    let is_power = |(y, n): &(ExprId, i32)| match graph.node(*y) {
-        Node::Power { base, exponent } => {
-            *n > 0 && is_whole(graph, *exponent) && moves(graph, *base)
-        }
-        _ => false,
-    };
-    let is_number = |(y, n): &(ExprId, i32)| {
-        let is_atom = !matches!(graph.node(*y), Node::Power { .. });
-        *n > 0 && is_atom && is_whole(graph, *y)
-    };
-    let (mut numbers, mut powers, mut others) = (Vec::new(), Vec::new(), Vec::new());
-    for factor in factors {
-        if is_number(factor) {
-            numbers.push(*factor);
-        } else if is_power(factor) {
-            powers.push(*factor);
-        } else {
-            others.push(*factor);
-        }
-    }
-    if numbers.is_empty() || powers.is_empty() {
-        return x;
-    }
-    let number = graph.product(Constant::ONE, &numbers);
-    let square = graph.multiply(number, number);
-    powers.extend(numbers);
-    let value = graph.product(Constant::ONE, &powers);
-    let zero = graph.constant(Constant::ZERO);
-    let chosen = graph.select(Comparison::LessOrEqual, square, zero, zero, value);
-    others.push((chosen, 1));
-    graph.product(coefficient, &others)
-}
-
-/// Whether an expression consists of indices and lengths.
-fn is_whole(graph: &Graph, x: ExprId) -> bool {
-    let inputs = graph.inputs_of(x);
-    !inputs.is_empty() && (inputs.iter()).all(|input| matches!(input, Input::Integer(_)))
 }
 
 /// Whether xⁿ may be infinite where something in it vanishes.

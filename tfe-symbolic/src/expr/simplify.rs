@@ -6,7 +6,7 @@
 //! | sums | x + 0 → x; like terms collect, c₁x + c₂x → (c₁+c₂)x; a common size of all coefficients comes out, 2x + 2y → 2(x + y); the first coefficient is positive, −x + y → −(x − y) |
 //! | nested sums | stay nested, because the inner one may be shared, unless a term cancels: (x + y) − x → y |
 //! | c·sin²x·r + c·cos²x·r | → c·r |
-//! | r·uⁿ⁺¹ − c·r·uⁿ·w | → r·uⁿ·(u − c·w), where c·w is a term of u, a sum with positive coefficients, and n < 0: 1/√(x² + y²) − x²/√(x² + y²)³ → y²/√(x² + y²)³, and with hypot(x, y) for the root |
+//! | r·uⁿ⁺¹ − c·r·uⁿ·w | → r·uⁿ·(u − c·w), where c·w is a term of u, a sum with positive coefficients, and n < 0: 1/√(x² + y²) − x²/√(x² + y²)³ → y²/√(x² + y²)³, and with hypot(x, y) for the root; not beside a power of the root whose exponent is a field |
 //! | products | x·0 → 0, x·1 → x; numbers come out in front; x·x → x², xᵃxᵇ → xᵃ⁺ᵇ; (x y)ⁿ → xⁿyⁿ (up to 16 factors) |
 //! | numbers | whose product or power leaves the normal numbers of `f64` stay beside their factors: (1e-200 x)² is not 0·x² |
 //! | quotients | x/y → x·y⁻¹; x/x → 1; xᵉ/xⁿ → xᵉ⁻ⁿ for a number e; xᵉ⁻¹·x → xᵉ |

@@ -234,6 +234,9 @@ fn parts_of_denominators(graph: &Graph, x: ExprId) -> Vec<PartOfDenominator> {
     };
     let mut found = Vec::new();
     for (divisor, n) in factors.iter().filter(|(_, n)| *n < 0) {
+        if stands_below_a_power(graph, factors, *divisor) {
+            continue;
+        }
         for term in terms_below(graph, *divisor) {
             let Some(rest) = quotient(factors, &term.factors) else {
                 continue;
@@ -260,6 +263,26 @@ fn parts_of_denominators(graph: &Graph, x: ExprId) -> Vec<PartOfDenominator> {
         }
     }
     found
+}
+
+/// Whether a power of a divisor, or of its root, whose exponent is not a number is among the factors. Then the degree of
+/// the divisor is not known, and joined terms would all vanish with it: the curvature of hᵉ is constant where e = 2.
+fn stands_below_a_power(graph: &Graph, factors: &[(ExprId, i32)], divisor: ExprId) -> bool {
+    let is_power = |(x, _): &(ExprId, i32)| {
+        let Node::Power { base, exponent } = graph.node(*x) else {
+            return false;
+        };
+        let base = graph.as_multiple(*base).1;
+        let radicand = match graph.node(base) {
+            Node::Call {
+                function: Function::Sqrt,
+                arguments,
+            } => arguments.first().map(|y| graph.as_multiple(*y).1),
+            _ => None,
+        };
+        graph.as_constant(*exponent).is_none() && (base == divisor || radicand == Some(divisor))
+    };
+    factors.iter().any(is_power)
 }
 
 /// The terms of a divisor that is a sum, or whose square is one.
