@@ -105,6 +105,11 @@ kinds! {
         /// The number as written.
         number: String,
     },
+    /// A number other than zero that is below all positive `f64`.
+    NumberTooSmall {
+        /// The number as written.
+        number: String,
+    },
     /// `lagrange = …`
     UnknownArgument {
         /// The name.

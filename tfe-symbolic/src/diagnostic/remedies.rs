@@ -46,6 +46,7 @@ impl Kind {
             Self::Bars => {
                 "write `abs(x)` for an absolute value, and the formula itself instead of a closure".into()
             }
+            Self::NumberTooSmall { .. } => "write `0`, or choose other units".into(),
             Self::NestedTooDeep { .. } | Self::TooLong { .. } => {
                 "name parts of it with `let`".into()
             }

@@ -30,6 +30,9 @@ impl Kind {
             }
             Self::TooLong { limit } => format!("expression has more than {limit} operators"),
             Self::NumberTooLarge { number } => format!("number `{number}` is too large"),
+            Self::NumberTooSmall { number } => {
+                format!("number `{number}` is too small: as an `f64` it is zero")
+            }
             Self::UnknownArgument { name, .. } => {
                 format!("unknown argument `{name}` of `dynamics`")
             }

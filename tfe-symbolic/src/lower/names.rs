@@ -17,20 +17,26 @@ enum Array {
     Field(String),
 }
 
+/// Whether all digits before the exponent of a literal are zeros.
+fn is_written_as_zero(number: &str) -> bool {
+    let mut digits = number
+        .bytes()
+        .take_while(|byte| !matches!(byte, b'e' | b'E'));
+    digits.all(|byte| !matches!(byte, b'1'..=b'9'))
+}
+
 impl Lowerer<'_> {
     pub(super) fn number(&mut self, text: &str, span: Span) -> Value {
-        match Constant::parse(&text.replace('_', "")) {
-            Some(value) => Value::Scalar(self.graph.constant(value)),
-            None => {
-                self.report(
-                    span,
-                    Kind::NumberTooLarge {
-                        number: text.to_owned(),
-                    },
-                );
-                Value::Error
+        let number = text.to_owned();
+        let mistake = match Constant::parse(&text.replace('_', "")) {
+            Some(value) if value.is_zero() && !is_written_as_zero(text) => {
+                Kind::NumberTooSmall { number }
             }
-        }
+            Some(value) => return Value::Scalar(self.graph.constant(value)),
+            None => Kind::NumberTooLarge { number },
+        };
+        self.report(span, mistake);
+        Value::Error
     }
 
     pub(super) fn index(&self, name: &str) -> Option<&Index> {
