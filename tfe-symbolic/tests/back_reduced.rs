@@ -401,6 +401,29 @@ fn a_spring_becomes_a_rod() {
     same(&rod.model, &by_hand, &[0.6, -0.7], &[0.3, 0.4]);
 }
 
+/// Fields beside the square do not change where it vanishes, in a denominator either.
+#[test]
+fn a_bar_becomes_a_rod() {
+    let by_hand = "coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y, constraint(rod) = sqrt(x^2 + y^2) - l";
+    let by_hand = declared(by_hand, "m g l");
+    for stiffness in ["E*A/(2*l)", "3*E*A/l^3", "E*A/(1 - c^2)", "E*A^2/2"] {
+        let text = format!(
+            "coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y - {stiffness}*(sqrt(x^2 + y^2) - l)^2, model(Rod, rigid(rod = E))"
+        );
+        let fields = match stiffness.contains('c') {
+            true => "m g E A l c",
+            false => "m g E A l",
+        };
+        let rod = variant(&text, fields);
+        if !stiffness.contains("A^2") {
+            assert_eq!(rod.model.used_fields, ["m", "g", "l"], "{stiffness}");
+            same(&rod.model, &by_hand, &[0.6, -0.7], &[0.3, 0.4]);
+        }
+        assert_eq!(rod.model.constraints.len(), 1, "{stiffness}");
+        assert_eq!(rod.model.constraints[0].name, "rod");
+    }
+}
+
 #[test]
 fn springs_of_one_stiffness_become_several_constraints() {
     let text = "coordinates(q[20]), momenta(p[20]), hamiltonian = sum(i in 0..20, p[i]^2/(2*m)) + k*sum(i in 0..19, (q[i+1] - q[i] - l)^2) + g*q[0],

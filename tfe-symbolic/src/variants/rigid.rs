@@ -141,31 +141,53 @@ fn elsewhere(model: &Declared, parameter: &Input) -> Option<&'static str> {
     }
 }
 
-/// φ where the term is c φ^2n, with c of the sign of an elastic energy, and φ a function of positions.
+/// φ where the term is c f φ^2n, with c of the sign of an elastic energy, f of other fields as A/l in E A φ²/(2 l), and φ a
+/// function of positions.
 fn elongation(
     graph: &mut Graph,
     form: Form,
     (coefficient, x): (Constant, ExprId),
     stiffness: &Input,
 ) -> Option<ExprId> {
-    if coefficient.is_negative() != (form == Form::Lagrangian) {
-        return None;
-    }
     let Node::Product(factors) = graph.node(x).clone() else {
         return None;
     };
-    let common = factors
+    let (scale, others): (Vec<(ExprId, i32)>, Vec<(ExprId, i32)>) = factors
         .iter()
-        .fold(0, |divisor, (_, n)| greatest_common_divisor(divisor, *n));
-    if common % 2 != 0 || factors.iter().any(|(_, n)| *n < 0) {
+        .copied()
+        .partition(|(y, _)| is_scale(graph, *y, stiffness));
+    // A sum of fields, as 1 − ν², may have either sign.
+    let is_sum = |(y, _): &(ExprId, i32)| matches!(graph.node(*y), Node::Sum { .. });
+    let has_sign = !scale.iter().any(is_sum);
+    if has_sign && coefficient.is_negative() != (form == Form::Lagrangian) {
         return None;
     }
-    let roots: Vec<(ExprId, i32)> = factors.iter().map(|(x, n)| (*x, n / common)).collect();
-    let root = graph.product(Constant::ONE, &roots);
+    let root = root_of_even_power(graph, &factors);
+    let root = root.or_else(|| root_of_even_power(graph, &others))?;
     let moves = |input: &Input| matches!(input, Input::Velocity(_) | Input::Momentum(_));
     let inputs = graph.inputs_of(root);
     let is_position = !inputs.iter().any(moves) && !inputs.contains(stiffness);
     (is_position && holds_state(graph, root)).then_some(root)
+}
+
+/// Whether an expression consists of fields other than the stiffness.
+fn is_scale(graph: &Graph, x: ExprId, stiffness: &Input) -> bool {
+    let is_field =
+        |input: &Input| matches!(input, Input::Parameter(_) | Input::ParameterElement(..));
+    let inputs = graph.inputs_of(x);
+    inputs.iter().all(is_field) && !inputs.contains(stiffness)
+}
+
+/// The root of a product that is an even power of something.
+fn root_of_even_power(graph: &mut Graph, factors: &[(ExprId, i32)]) -> Option<ExprId> {
+    let common = factors
+        .iter()
+        .fold(0, |divisor, (_, n)| greatest_common_divisor(divisor, *n));
+    if common == 0 || common % 2 != 0 || factors.iter().any(|(_, n)| *n < 0) {
+        return None;
+    }
+    let roots: Vec<(ExprId, i32)> = factors.iter().map(|(x, n)| (*x, n / common)).collect();
+    Some(graph.product(Constant::ONE, &roots))
 }
 
 /// Whether a constraint has a row of zeros, or of zero over zero, where it holds: the elongation of a one-sided spring, as max(x, 0), or a sum of squares.
