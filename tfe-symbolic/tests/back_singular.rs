@@ -195,3 +195,24 @@ fn fields_as_exponents_of_distances() {
         assert_eq!(found.force_z.concat(), [-0.3, 0.0, 0.0, -0.3], "{parts}");
     }
 }
+
+/// Smooth functions of |x| have the derivatives at zero that they have beside it.
+#[test]
+fn smooth_functions_of_absolute_values() {
+    for (energy, expected) in [
+        ("cosh(abs(x))", [1.0, 0.0, 1.0]),
+        ("cos(abs(x)/2)", [1.0, 0.0, -0.25]),
+        ("sign(x)*sin(abs(x))", [0.0, 1.0, 0.0]),
+        ("exp(-abs(x/2)^2)", [1.0, 0.0, -0.5]),
+        ("sqrt(x^4)", [0.0, 0.0, 2.0]),
+        ("abs(3*x^2)", [0.0, 0.0, 6.0]),
+        ("norm([x^2])", [0.0, 0.0, 2.0]),
+    ] {
+        check(energy, &[], 0.0, &expected);
+    }
+    check("exp(-abs(x/2)^e)", &[("e", 2.0)], 0.0, &[1.0, 0.0, -0.5]);
+    let text = "coordinates(x), lagrangian = dot(x)^2/2, force(x) = -sign(dot(x))*(1 - exp(-abs(dot(x))/2)) + sign(x)^2";
+    let found = results_of(text, &[], ALL, &[0.0], &[0.0]);
+    // The square of a sign that is declared is zero at zero.
+    assert_eq!((found.force[0], found.force_z[0][0]), (0.0, -0.5));
+}

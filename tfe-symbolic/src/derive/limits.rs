@@ -25,7 +25,7 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::rewrite::Mapping;
 use crate::program::Array;
 use exponents::where_exponents_vanish;
-use facts::is_surely_positive;
+use facts::{factors_of, is_surely_positive};
 use norms::Norms;
 
 /// The depth to which factors are searched for values that may be infinite.
@@ -36,21 +36,26 @@ pub(crate) fn take_limits<'a>(
     graph: &mut Graph,
     lists: impl IntoIterator<Item = &'a mut Vec<Entry>>,
 ) {
-    let (mut slopes, mut values) = (Vec::new(), Vec::new());
+    let (mut derivatives, mut forces, mut values) = (Vec::new(), Vec::new(), Vec::new());
     for entry in lists.into_iter().flatten() {
-        if is_slope(entry.place.array) {
-            slopes.push(entry);
-        } else if is_value(entry.place.array) {
-            values.push(entry);
+        match entry.place.array {
+            Array::Force => forces.push(entry),
+            Array::Value | Array::Observable(_) | Array::SiteObservable => values.push(entry),
+            array if is_derivative(array) => derivatives.push(entry),
+            _ => {}
         }
     }
+    // The signs in a force are as declared.
+    rewrite(graph, &mut derivatives, &mut without_squares_of_signs);
     let mut norms = Norms::default();
-    rewrite(graph, slopes, &mut |graph, product| {
+    let mut slopes = derivatives;
+    slopes.append(&mut forces);
+    rewrite(graph, &mut slopes, &mut |graph, product| {
         let product = norms.limit(graph, product);
         let product = inside_choices(graph, product);
         where_exponents_vanish(graph, product)
     });
-    rewrite(graph, values, &mut |graph, product| {
+    rewrite(graph, &mut values, &mut |graph, product| {
         norms.limit(graph, product)
     });
 }
@@ -58,7 +63,7 @@ pub(crate) fn take_limits<'a>(
 /// Rewrites the products in entries, children first.
 fn rewrite(
     graph: &mut Graph,
-    entries: Vec<&mut Entry>,
+    entries: &mut [&mut Entry],
     limit: &mut dyn FnMut(&mut Graph, ExprId) -> ExprId,
 ) {
     let roots: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
@@ -85,27 +90,36 @@ fn rewrite(
     }
 }
 
-/// Derivatives of the energy, forces and their derivatives.
-fn is_slope(array: Array) -> bool {
+/// Derivatives of the energy and of forces.
+fn is_derivative(array: Array) -> bool {
     matches!(
         array,
-        Array::ByZ
-            | Array::ByQ
-            | Array::Force
-            | Array::ZZ
-            | Array::ZQ
-            | Array::QQ
-            | Array::ForceZ
-            | Array::ForceQ
+        Array::ByZ | Array::ByQ | Array::ZZ | Array::ZQ | Array::QQ | Array::ForceZ | Array::ForceQ
     )
 }
 
-/// Energies and outputs.
-fn is_value(array: Array) -> bool {
-    matches!(
-        array,
-        Array::Value | Array::Observable(_) | Array::SiteObservable
-    )
+/// A derivative f″(|x|) sign²x of a function of |x|, with one for the square of the sign, which it is on both sides of zero.
+fn without_squares_of_signs(graph: &mut Graph, x: ExprId) -> ExprId {
+    let mut factors = factors_of(graph, x);
+    let mut is_changed = false;
+    for (y, n) in &mut factors {
+        let is_sign = matches!(
+            graph.node(*y),
+            Node::Call {
+                function: Function::Sign,
+                ..
+            }
+        );
+        if is_sign && *n > 1 {
+            *n %= 2;
+            is_changed = true;
+        }
+    }
+    if !is_changed {
+        return x;
+    }
+    let coefficient = graph.as_multiple(x).0;
+    graph.product(coefficient, &factors)
 }
 
 /// A choice between a value and zero.

@@ -12,7 +12,7 @@
 //! | quotients | x/y → x·y⁻¹; x/x → 1; xᵉ/xⁿ → xᵉ⁻ⁿ for a number e; xᵉ⁻¹·x → xᵉ |
 //! | powers | x^n a product for whole n; x^(n/2) → √xⁿ |
 //! | √ | √x^(2n) → xⁿ; √(x²) → abs x |
-//! | abs, sign | abs(x)^(2n) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
+//! | abs, sign | abs(x)^(2n) → x^(2n); abs(x^(2n)) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
 //! | parity | sin(−x) → −sin x, cos(−x) → cos x, and so for each even or odd function |
 //! | min, max | of x and x → x; hypot(x, 0) → abs x |
 //! | select | with equal branches → the branch; with a decided condition → its branch |
@@ -156,6 +156,9 @@ impl Graph {
                     ..
                 },
             ) => return x,
+            (Function::Abs, Node::Product(factors)) if factors.iter().all(|(_, n)| n % 2 == 0) => {
+                return x;
+            }
             _ => {}
         }
         self.intern(Node::Call {
@@ -514,6 +517,9 @@ pub(super) mod tests {
         assert_eq!(g.call(Function::Sqrt, &[square]), size);
         assert_eq!(g.power(size, two), square);
         assert_eq!(g.call(Function::Abs, &[size]), size);
+        assert_eq!(g.call(Function::Abs, &[square]), square);
+        let fourth = g.multiply(square, square);
+        assert_eq!(g.call(Function::Sqrt, &[fourth]), square);
         assert_eq!(g.call(Function::Abs, &[root]), root);
     }
 
