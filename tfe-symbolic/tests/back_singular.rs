@@ -216,3 +216,35 @@ fn smooth_functions_of_absolute_values() {
     // The square of a sign that is declared is zero at zero.
     assert_eq!((found.force[0], found.force_z[0][0]), (0.0, -0.5));
 }
+
+/// Logistic functions and hyperbolic secants far from their step, where the exponentials in them are infinite.
+#[test]
+fn steps_of_exponentials_far_away() {
+    for (energy, before, after) in [
+        ("1/(1 + exp(-x/e))", [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        ("exp(x/e)/(1 + exp(x/e))", [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        ("2/(1 + exp(-2*x/e)) - 1", [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
+        ("x/(1 + exp(-x/e))", [0.0, 0.0, 0.0], [1.0, 1.0, 0.0]),
+        ("1/cosh(x/e)^2", [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+    ] {
+        check(energy, &[("e", 1e-4)], -1.0, &before);
+        check(energy, &[("e", 1e-4)], 1.0, &after);
+    }
+    // The slopes of functions that are infinite themselves.
+    for energy in ["e*ln(cosh(x/e))", "e*ln(1 + exp(x/e))"] {
+        let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+        let found = results_of(&text, &[("e", 1e-4)], ALL, &[1.0], &[0.0]);
+        assert_eq!((found.q[0], found.qq[0][0]), (-1.0, 0.0), "{energy}");
+    }
+    let text = "coordinates(x), lagrangian = dot(x)^2/2, force(x) = -2/(1 + exp(-dot(x)/e)) + 1";
+    let found = results_of(text, &[("e", 1e-4)], ALL, &[0.0], &[-1.0]);
+    assert_eq!((found.force[0], found.force_z[0][0]), (1.0, 0.0));
+    // In the step.
+    let s = 1.0 / (1.0 + (-0.3_f64).exp());
+    let slope = s * (1.0 - s);
+    let expected = [s, slope, slope * (1.0 - 2.0 * s)];
+    check("1/(1 + exp(-x/e))", &[("e", 1.0)], 0.3, &expected);
+    let (t, square) = (0.3_f64.tanh(), 0.3_f64.cosh().powi(-2));
+    let expected = [square, -2.0 * t * square, (6.0 * t * t - 2.0) * square];
+    check("1/cosh(x/e)^2", &[("e", 1.0)], 0.3, &expected);
+}

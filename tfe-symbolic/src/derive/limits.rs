@@ -8,9 +8,11 @@
 //! ```
 //!
 //! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
-//! are treated in `norms.rs`, exponents in `exponents.rs`. This is done to the entries as a last step, after factors have
-//! been combined, so that m/√m is √m and no choice is needed. Energies and outputs have the limits of norms only.
+//! are treated in `norms.rs`, exponents in `exponents.rs`, quotients of exponentials in `exponentials.rs`. This is done to
+//! the entries as a last step, after factors have been combined, so that m/√m is √m and no choice is needed. Energies and
+//! outputs have the limits of norms and of quotients of exponentials only.
 
+mod exponentials;
 mod exponents;
 mod facts;
 mod norm;
@@ -24,6 +26,7 @@ use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::rewrite::Mapping;
 use crate::program::Array;
+use exponentials::over_exponentials;
 use exponents::where_exponents_vanish;
 use facts::{factors_of, is_surely_positive};
 use norms::Norms;
@@ -52,11 +55,13 @@ pub(crate) fn take_limits<'a>(
     slopes.append(&mut forces);
     rewrite(graph, &mut slopes, &mut |graph, product| {
         let product = norms.limit(graph, product);
+        let product = over_exponentials(graph, product);
         let product = inside_choices(graph, product);
         where_exponents_vanish(graph, product)
     });
     rewrite(graph, &mut values, &mut |graph, product| {
-        norms.limit(graph, product)
+        let product = norms.limit(graph, product);
+        over_exponentials(graph, product)
     });
 }
 

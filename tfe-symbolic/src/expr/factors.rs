@@ -7,8 +7,8 @@ use crate::expr::input::Input;
 use crate::expr::ordered::SortedMap;
 
 impl Graph {
-    /// √x^(2n) → xⁿ, xⁿ/√x → xⁿ⁻¹ √x, abs(x)^(2n) → x^(2n), x sign x → abs x and xᵉ/xⁿ → xᵉ⁻ⁿ; returns the constant by
-    /// which the product is to be multiplied.
+    /// √x^(2n) → xⁿ, xⁿ/√x → xⁿ⁻¹ √x, abs(x)^(2n) → x^(2n), x sign x → abs x, sinh x/cosh x → tanh x and xᵉ/xⁿ → xᵉ⁻ⁿ;
+    /// returns the constant by which the product is to be multiplied.
     pub(super) fn fold_powers(
         &mut self,
         collected: &mut SortedMap<ExprId, i64>,
@@ -20,6 +20,7 @@ impl Graph {
             coefficient = coefficient * self.lift_roots(collected);
         }
         self.merge_powers(collected, waiting);
+        self.fold_tangents(collected);
         for (x, n) in collected.iter_mut() {
             let Node::Call {
                 function,
@@ -143,6 +144,35 @@ impl Graph {
             is_folded = true;
         }
         is_folded
+    }
+
+    /// sinh x/cosh x → tanh x, which is finite where both are infinite.
+    fn fold_tangents(&mut self, collected: &mut SortedMap<ExprId, i64>) {
+        let below = |(x, n): &(ExprId, i64)| match self.node(*x) {
+            Node::Call {
+                function: Function::Cosh,
+                arguments,
+            } if *n < 0 => Some((*x, *n, arguments.clone())),
+            _ => None,
+        };
+        let cosines: Vec<(ExprId, i64, Vec<ExprId>)> = collected.iter().filter_map(below).collect();
+        for (cosine, n, arguments) in cosines {
+            let sine = Node::Call {
+                function: Function::Sinh,
+                arguments: arguments.clone(),
+            };
+            let Some(sine) = self.find(&sine) else {
+                continue;
+            };
+            let above = collected.get(&sine).copied().unwrap_or_default();
+            let times = above.min(n.saturating_neg());
+            if times > 0 {
+                *collected.get_or_default(sine) -= times;
+                *collected.get_or_default(cosine) += times;
+                let tangent = self.call(Function::Tanh, &arguments);
+                *collected.get_or_default(tangent) += times;
+            }
+        }
     }
 
     /// xᵉ/xⁿ → xᵉ⁻ⁿ for a number e that is not whole, and (c x)ᵉ xⁿ → (c x)ᵉ⁺ⁿ/cⁿ where e is below zero, or e − 1 and the like: the same numbers, and the limit at zero.
@@ -277,6 +307,20 @@ mod tests {
         }
         let alone = g.multiply(y, sign);
         assert_eq!(g.display(alone).to_string(), "y*sign(x)");
+    }
+
+    #[test]
+    fn quotients_of_hyperbolic_functions() {
+        let (mut g, x, y, _) = variables();
+        let [sine, cosine, tangent] =
+            [Function::Sinh, Function::Cosh, Function::Tanh].map(|f| g.call(f, &[x]));
+        assert_eq!(g.divide(sine, cosine), tangent);
+        let product = g.product(Constant::ONE, &[(sine, 1), (cosine, -3), (y, 1)]);
+        let expected = g.product(Constant::ONE, &[(tangent, 1), (cosine, -2), (y, 1)]);
+        assert_eq!(product, expected);
+        let other = g.call(Function::Cosh, &[y]);
+        let quotient = g.divide(sine, other);
+        assert_eq!(g.display(quotient).to_string(), "sinh(x)*cosh(y)^(-1)");
     }
 
     #[test]

@@ -13,6 +13,7 @@
 //! | powers | x^n a product for whole n; x^(n/2) → √xⁿ |
 //! | √ | √x^(2n) → xⁿ; √(x²) → abs x |
 //! | abs, sign | abs(x)^(2n) → x^(2n); abs(x^(2n)) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
+//! | sinh, cosh | sinh x/cosh x → tanh x |
 //! | parity | sin(−x) → −sin x, cos(−x) → cos x, and so for each even or odd function |
 //! | min, max | of x and x → x; hypot(x, 0) → abs x |
 //! | select | with equal branches → the branch; with a decided condition → its branch |
