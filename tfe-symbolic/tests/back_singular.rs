@@ -248,3 +248,23 @@ fn steps_of_exponentials_far_away() {
     let expected = [square, -2.0 * t * square, (6.0 * t * t - 2.0) * square];
     check("1/cosh(x/e)^2", &[("e", 1.0)], 0.3, &expected);
 }
+
+/// An exponential vanishes faster than the poles in its exponent grow.
+#[test]
+fn exponentials_of_poles() {
+    let bump = "select(abs(x) < 1, exp(-1/(1 - x^2)), 0)";
+    for (energy, x) in [
+        ("exp(-1/x^2)", 0.0),
+        ("exp(-1/x^2)", 1e-200),
+        ("x*exp(-1/x^2)", 0.0),
+        ("exp(-1/abs(x))", 0.0),
+        ("exp(-1/(3*abs(x)))*x", 0.0),
+        (bump, 1.0),
+        (bump, -1.0),
+        (bump, 1.0 - 1e-9),
+    ] {
+        check(energy, &[], x, &[0.0, 0.0, 0.0]);
+    }
+    let e = (-4_f64).exp();
+    check("exp(-1/x^2)", &[], 0.5, &[e, 16.0 * e, 160.0 * e]);
+}

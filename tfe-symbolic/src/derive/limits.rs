@@ -8,9 +8,9 @@
 //! ```
 //!
 //! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
-//! are treated in `norms.rs`, exponents in `exponents.rs`, quotients of exponentials in `exponentials.rs`. This is done to
-//! the entries as a last step, after factors have been combined, so that m/√m is √m and no choice is needed. Energies and
-//! outputs have the limits of norms and of quotients of exponentials only.
+//! are treated in `norms.rs`, exponents in `exponents.rs`, exponentials in `exponentials.rs`. This is done to the entries as
+//! a last step, after factors have been combined, so that m/√m is √m and no choice is needed. Energies and outputs have the
+//! limits of norms and of quotients of exponentials only.
 
 mod exponentials;
 mod exponents;
@@ -26,7 +26,7 @@ use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::rewrite::Mapping;
 use crate::program::Array;
-use exponentials::over_exponentials;
+use exponentials::{over_exponentials, where_exponentials_vanish};
 use exponents::where_exponents_vanish;
 use facts::{factors_of, is_surely_positive};
 use norms::Norms;
@@ -57,7 +57,8 @@ pub(crate) fn take_limits<'a>(
         let product = norms.limit(graph, product);
         let product = over_exponentials(graph, product);
         let product = inside_choices(graph, product);
-        where_exponents_vanish(graph, product)
+        let product = where_exponents_vanish(graph, product);
+        where_exponentials_vanish(graph, product)
     });
     rewrite(graph, &mut values, &mut |graph, product| {
         let product = norms.limit(graph, product);

@@ -1,13 +1,16 @@
-//! Quotients of exponentials, far from where these are of the size of one.
+//! Products of exponentials and what is infinite where these are zero, or infinite themselves.
 //!
 //! ```text
 //! E = eᵘ,  S = r + d E        E/S² = 1/(S (r/E + d))
+//! E = e^(−1/x²)               2 E/x³ = { 0  where E ≤ 0;  2 E/x³  elsewhere }
 //! ```
 //!
 //! The slope E/S² of a logistic function 1/S is infinite over infinite where E is infinite, and zero in truth. Divided by
-//! E, a sum is finite there.
+//! E, a sum is finite there. An exponential whose exponent has a pole vanishes faster than any power grows: where it is
+//! zero, so is its product with poles.
 
-use super::facts::{factors_of, moves};
+use super::facts::{factors_of, is_surely_positive, moves};
+use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
@@ -16,7 +19,7 @@ use crate::expr::graph::{ExprId, Graph, Node};
 pub(super) fn over_exponentials(graph: &mut Graph, x: ExprId) -> ExprId {
     let factors = factors_of(graph, x);
     for (exponential, k) in &factors {
-        if *k <= 0 || !is_exponential(graph, *exponential) {
+        if *k <= 0 || exponent_of(graph, *exponential).is_none() {
             continue;
         }
         for (sum, m) in &factors {
@@ -38,14 +41,68 @@ pub(super) fn over_exponentials(graph: &mut Graph, x: ExprId) -> ExprId {
     x
 }
 
-fn is_exponential(graph: &Graph, x: ExprId) -> bool {
-    matches!(
-        graph.node(x),
+/// The depth to which factors and terms are searched for poles.
+const MAX_DEPTH: usize = 4;
+
+/// A product with zero where an exponential in it is zero, if its exponent has a pole, and another factor has one in the same inputs.
+pub(super) fn where_exponentials_vanish(graph: &mut Graph, x: ExprId) -> ExprId {
+    let factors = factors_of(graph, x);
+    let exponential = factors.iter().find(|(exponential, k)| {
+        let Some(exponent) = exponent_of(graph, *exponential).filter(|_| *k > 0) else {
+            return false;
+        };
+        let inputs = graph.inputs_of(exponent);
+        let diverges = |(y, n): &(ExprId, i32)| {
+            let concerns = |y: ExprId| graph.inputs_of(y).iter().any(|leaf| inputs.contains(leaf));
+            y != exponential && has_pole(graph, *y, *n, MAX_DEPTH) && concerns(*y)
+        };
+        has_pole(graph, exponent, 1, MAX_DEPTH) && factors.iter().any(diverges)
+    });
+    let Some((exponential, _)) = exponential else {
+        return x;
+    };
+    let zero = graph.constant(Constant::ZERO);
+    graph.select(Comparison::LessOrEqual, *exponential, zero, zero, x)
+}
+
+/// u of eᵘ.
+fn exponent_of(graph: &Graph, x: ExprId) -> Option<ExprId> {
+    match graph.node(x) {
         Node::Call {
             function: Function::Exp,
-            ..
+            arguments,
+        } => arguments.first().copied(),
+        _ => None,
+    }
+}
+
+/// Whether xⁿ is infinite where something in it vanishes.
+fn has_pole(graph: &Graph, x: ExprId, n: i32, depth: usize) -> bool {
+    let Some(depth) = depth.checked_sub(1) else {
+        return false;
+    };
+    let x = graph.as_multiple(x).1;
+    if !moves(graph, x) {
+        return false;
+    }
+    match graph.node(x) {
+        Node::Product(factors) if n > 0 => {
+            (factors.iter()).any(|(y, m)| has_pole(graph, *y, *m, depth))
         }
-    )
+        Node::Sum { terms, .. } if n > 0 => {
+            (terms.iter()).any(|(_, y)| has_pole(graph, *y, 1, depth))
+        }
+        Node::Power { base, exponent } => {
+            let exponent = graph.as_constant(*exponent);
+            exponent.is_some_and(|exponent| exponent.is_negative() == (n > 0))
+                && !is_surely_positive(graph, *base)
+        }
+        Node::Call {
+            function: Function::Exp | Function::Cosh,
+            ..
+        } => false,
+        _ => n < 0 && !is_surely_positive(graph, x),
+    }
 }
 
 /// S/E of a sum S of multiples of E and of what is at rest; `None` for other sums.
