@@ -268,3 +268,85 @@ fn exponentials_of_poles() {
     let e = (-4_f64).exp();
     check("exp(-1/x^2)", &[], 0.5, &[e, 16.0 * e, 160.0 * e]);
 }
+
+/// Friction −μ tanh(h/ε) v/h with h = |v|, and with other functions: zero at rest, where its slope is −μ/ε in each
+/// direction.
+#[test]
+fn friction_in_the_plane_at_rest() {
+    let parameters = [("mu", 0.6), ("eps", 0.125)];
+    for function in ["tanh", "atan", "sin"] {
+        for h in ["norm([dot(x), dot(y)])", "hypot(dot(x), dot(y))"] {
+            let force = |v: &str| format!("force({v}) = -mu*{function}({h}/eps)*dot({v})/{h}");
+            let (x, y) = (force("x"), force("y"));
+            let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2, {x}, {y}");
+            // A motion that comes to rest gets near enough that the third power of h is zero.
+            for v in [[0.0; 2], [3e-110, 4e-110]] {
+                let found = results_of(&text, &parameters, ALL, &[0.0; 2], &v);
+                close(found.force[0], -4.8 * v[0], function);
+                close(found.force[1], -4.8 * v[1], function);
+                assert_eq!(found.force_z.concat(), [-4.8, 0.0, 0.0, -4.8], "{h}");
+            }
+        }
+    }
+    let h = "norm([dot(x), dot(y), dot(z)])";
+    let text = format!(
+        "coordinates(x, y, z), lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2, force(x) = -mu*tanh({h}/eps)*dot(x)/{h}"
+    );
+    let found = results_of(&text, &parameters, ALL, &[0.0; 3], &[0.0; 3]);
+    assert_eq!(found.force_z[0], [-4.8, 0.0, 0.0]);
+    // In motion, with h = 0.05.
+    let h = "hypot(dot(x), dot(y))";
+    let text = format!(
+        "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2, force(x) = -mu*tanh({h}/eps)*dot(x)/{h}"
+    );
+    let found = results_of(&text, &parameters, ALL, &[0.0; 2], &[0.03, 0.04]);
+    let t = 0.4_f64.tanh();
+    let (over, slope) = (t / 0.05, (1.0 - t * t) / 0.125);
+    close(found.force[0], -0.6 * t * 0.6, "force");
+    close(
+        found.force_z[0][0],
+        -0.6 * (0.64 * over + 0.36 * slope),
+        "by x",
+    );
+    close(found.force_z[0][1], -0.6 * 0.48 * (slope - over), "by y");
+}
+
+/// Smooth functions of a distance have a tangent at zero.
+#[test]
+fn even_functions_of_distances_at_zero() {
+    for (energy, tangent) in [
+        ("cos(norm([x, y]))", -1.0),
+        ("cosh(hypot(x, y)/l)", 4.0),
+        ("l*ln(cosh(norm([x, y])/l))", 2.0),
+        ("norm([x, y])*sin(norm([x, y]))", 2.0),
+        ("exp(-norm([x, y])^2)", -2.0),
+    ] {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
+        let parameters: &[_] = match energy.contains('l') {
+            true => &[("l", 0.5)],
+            false => &[],
+        };
+        let found = results_of(&text, parameters, ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.q, [0.0; 2], "{energy}");
+        let expected = [-tangent, 0.0, 0.0, -tangent];
+        assert_eq!(found.qq.concat(), expected, "{energy}");
+    }
+}
+
+/// What depends on the direction has no limit.
+#[test]
+fn directions_have_no_limit() {
+    for (energy, q) in [
+        ("norm([x, y, z])", [0.0; 3]),
+        ("hypot(x, y)", [0.0; 3]),
+        ("x*y/norm([x, y])", [0.0; 3]),
+        ("x*y*z/norm([x, y, z])^2", [0.0; 3]),
+        ("x^2*y^2/norm([x, y])^3", [0.0; 3]),
+    ] {
+        let text = format!(
+            "coordinates(x, y, z), lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - z^2 - {energy}"
+        );
+        let found = results_of(&text, &[], ALL, &q, &[0.0; 3]);
+        assert!(found.q[0].is_nan() && found.qq[0][1].is_nan(), "{energy}");
+    }
+}

@@ -8,9 +8,10 @@
 //! ```
 //!
 //! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
-//! are treated in `norms.rs`, exponents in `exponents.rs`, exponentials in `exponentials.rs`. This is done to the entries as
-//! a last step, after factors have been combined, so that m/√m is √m and no choice is needed. Energies and outputs have the
-//! limits of norms and of quotients of exponentials only.
+//! are treated in `norms.rs`, exponents in `exponents.rs`, exponentials in `exponentials.rs`, and sums whose terms have a
+//! limit only together in `together.rs`. This is done to the entries as a last step, after factors have been combined, so
+//! that m/√m is √m and no choice is needed. Energies and outputs have the limits of norms and of quotients of exponentials
+//! only.
 
 mod exponentials;
 mod exponents;
@@ -18,6 +19,7 @@ mod facts;
 mod norm;
 mod norms;
 mod powers;
+mod together;
 
 use crate::derive::entry::Entry;
 use crate::expr::comparison::Comparison;
@@ -30,6 +32,7 @@ use exponentials::{over_exponentials, where_exponentials_vanish};
 use exponents::where_exponents_vanish;
 use facts::{factors_of, is_surely_positive};
 use norms::Norms;
+use together::Together;
 
 /// The depth to which factors are searched for values that may be infinite.
 const MAX_DEPTH: usize = 4;
@@ -49,36 +52,54 @@ pub(crate) fn take_limits<'a>(
         }
     }
     // The signs in a force are as declared.
-    rewrite(graph, &mut derivatives, &mut without_squares_of_signs);
-    let mut norms = Norms::default();
+    rewrite(
+        graph,
+        &mut derivatives,
+        &mut |graph, old, new| match is_product(graph, old) {
+            true => without_squares_of_signs(graph, new),
+            false => new,
+        },
+    );
+    let (mut norms, mut together) = (Norms::default(), Together::default());
     let mut slopes = derivatives;
     slopes.append(&mut forces);
-    rewrite(graph, &mut slopes, &mut |graph, product| {
-        let product = norms.limit(graph, product);
+    rewrite(graph, &mut slopes, &mut |graph, old, new| {
+        if !is_product(graph, old) {
+            return together.limit(graph, &mut norms, (old, new));
+        }
+        let product = norms.limit(graph, new);
         let product = over_exponentials(graph, product);
         let product = inside_choices(graph, product);
         let product = where_exponents_vanish(graph, product);
         where_exponentials_vanish(graph, product)
     });
-    rewrite(graph, &mut values, &mut |graph, product| {
-        let product = norms.limit(graph, product);
+    rewrite(graph, &mut values, &mut |graph, old, new| {
+        if !is_product(graph, old) {
+            return new;
+        }
+        let product = norms.limit(graph, new);
         over_exponentials(graph, product)
     });
 }
 
-/// Rewrites the products in entries, children first.
+fn is_product(graph: &Graph, x: ExprId) -> bool {
+    matches!(graph.node(x), Node::Product(_))
+}
+
+/// Rewrites the products and sums in entries, children first: `limit` is given each of them, and what has become of it by
+/// the limits of its children.
 fn rewrite(
     graph: &mut Graph,
     entries: &mut [&mut Entry],
-    limit: &mut dyn FnMut(&mut Graph, ExprId) -> ExprId,
+    limit: &mut dyn FnMut(&mut Graph, ExprId, ExprId) -> ExprId,
 ) {
     let roots: Vec<ExprId> = entries.iter().map(|entry| entry.value).collect();
     let mut mapping = Mapping::default();
     for old in graph.reachable(&roots) {
         let node = graph.node(old);
-        let is_product = matches!(node, Node::Product(_));
+        let may_have_one = matches!(node, Node::Product(_) | Node::Sum { .. });
         let keeps = mapping.keeps(node);
-        if keeps && !is_product {
+        if keeps && !may_have_one {
             continue;
         }
         let mut new = old;
@@ -86,8 +107,8 @@ fn rewrite(
             let node = node.clone();
             new = graph.remake(&node, &mapping);
         }
-        if is_product {
-            new = limit(graph, new);
+        if may_have_one {
+            new = limit(graph, old, new);
         }
         mapping.set(old, new);
     }

@@ -55,6 +55,21 @@ fn without_parameters(graph: &Graph, square: ExprId) -> Option<ExprId> {
     }
 }
 
+/// Whether f(x)/x is one at x = 0.
+pub(super) fn is_small_with_its_argument(function: Function) -> bool {
+    matches!(
+        function,
+        Function::Sin
+            | Function::Tan
+            | Function::Asin
+            | Function::Atan
+            | Function::Sinh
+            | Function::Tanh
+            | Function::Asinh
+            | Function::Atanh
+    )
+}
+
 impl Norm {
     /// The norm of which an expression is a root, a power or the square, or which it is itself.
     pub(super) fn of(graph: &Graph, x: ExprId) -> Option<Self> {
@@ -134,6 +149,11 @@ impl Norm {
         }
     }
 
+    /// Whether it is a norm of parts, and not just an argument of a logarithm.
+    pub(super) fn has_parts(&self) -> bool {
+        !self.is_signed
+    }
+
     pub(super) fn is(&self, other: &Self) -> bool {
         (self.root, self.square) == (other.root, other.square)
     }
@@ -161,8 +181,8 @@ impl Norm {
         }
     }
 
-    /// The lowest degree of the terms of an expression in the norm and its parts.
-    fn degree(&self, graph: &Graph, x: ExprId, depth: usize) -> f64 {
+    /// A lower bound of the degree of an expression in the norm and its parts, of which other divisors do not count.
+    pub(super) fn degree(&self, graph: &Graph, x: ExprId, depth: usize) -> f64 {
         let Some(depth) = depth.checked_sub(1) else {
             return 0.0;
         };
@@ -183,11 +203,24 @@ impl Norm {
                     false => least.min(0.0),
                 }
             }
+            Node::Call {
+                function,
+                arguments,
+            } => {
+                let degrees = arguments.iter().map(|y| self.degree(graph, *y, depth));
+                let least = degrees.reduce(f64::min).unwrap_or(0.0).max(0.0);
+                match function {
+                    _ if is_small_with_its_argument(*function) => least,
+                    Function::Abs | Function::Hypot | Function::Min | Function::Max => least,
+                    Function::Sqrt => least / 2.0,
+                    _ => 0.0,
+                }
+            }
             _ => 0.0,
         }
     }
 
-    /// The same of a product, of which other divisors do not count.
+    /// The same of a product.
     pub(super) fn degree_of_product(
         &self,
         graph: &Graph,

@@ -77,7 +77,7 @@ impl Norms {
     }
 
     /// The norms that may make terms of a sum infinite; none for what is no sum.
-    fn of_sum(&mut self, graph: &Graph, x: ExprId, sums: usize) -> Vec<Norm> {
+    pub(super) fn of_sum(&mut self, graph: &Graph, x: ExprId, sums: usize) -> Vec<Norm> {
         if let Some(known) = self.in_sums.get(&(x, sums)) {
             return known.clone();
         }

@@ -7,7 +7,7 @@ use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
 
 /// Degrees are sums of exponents, which may have rounding errors.
-const ROUNDING: f64 = 1e-6;
+pub(super) const ROUNDING: f64 = 1e-6;
 
 impl Norm {
     /// The product with this norm replaced by one where both vanish; `None` where the product is unchanged.
