@@ -25,16 +25,6 @@ pub(crate) struct Change<const N: usize, L: Length<N> = FixedLength> {
     pub(crate) parameter: Option<usize>,
 }
 
-impl<const N: usize> Change<N> {
-    /// No change.
-    pub(crate) const ZERO: Self = Self {
-        t: 0.0,
-        q: [0.0; N],
-        p: [0.0; N],
-        parameter: None,
-    };
-}
-
 impl<const N: usize, L: Length<N>> Change<N, L> {
     /// The change of a parameter alone, or no change for `None`; `like` is a vector of the length of the coordinates.
     pub(crate) fn by(parameter: Option<usize>, like: &L::Vector) -> Self {
@@ -114,20 +104,6 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
         }
         let found = inverse * DVector::from_column_slice(&right);
         std::array::from_fn(|a| found[a])
-    }
-
-    /// The changes of all outputs, given the change of the velocity.
-    pub(crate) fn outputs(&self, change: &Change<N>, velocity: &[f64; N]) -> Vec<f64> {
-        let Place { t, q, p, v } = self.place;
-        let time = Dual::new(t, change.t).by_parameter(change.parameter);
-        let q = duals(q, &change.q);
-        let z = match M::FORM {
-            Form::Lagrangian => duals(v, velocity),
-            Form::Hamiltonian => duals(p, &change.p),
-        };
-        let mut values = vec![Dual::ZERO; self.model.columns()];
-        self.model.observables(time, &q, &z, &mut values);
-        values.iter().map(|value| value.slope).collect()
     }
 }
 

@@ -1,5 +1,7 @@
 //! Gradients of losses by the adjoint method, backward along a run (T-127).
 
+#[cfg(feature = "sparse")]
+mod backward;
 mod family;
 mod view;
 

@@ -43,10 +43,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         };
         let named: Vec<Direction> = parameters.iter().map(by).collect();
         let directions = |element: &Element| {
-            let mut all = named.clone();
-            all.extend(element.moves.0.then_some(START));
-            all.extend(element.moves.1.then_some(END));
-            all
+            let all = named.iter().copied().chain(moving(element));
+            all.collect::<Vec<_>>()
         };
         let elements = &trail.elements;
         let mut between = trail.between.iter().peekable();
@@ -96,6 +94,13 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             }
         }
     }
+}
+
+/// The directions in which events move the ends of an element: its start, then its end.
+pub(super) fn moving(element: &Element) -> impl Iterator<Item = Direction> {
+    let (starts, ends) = element.moves;
+    let start = starts.then_some(START);
+    start.into_iter().chain(ends.then_some(END))
 }
 
 /// The error of a run one of whose elements has no derivative.

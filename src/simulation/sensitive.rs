@@ -3,6 +3,9 @@
 mod acts;
 pub(super) mod carried;
 pub(super) mod family;
+pub(super) mod jump;
+#[cfg(feature = "sparse")]
+pub(super) mod transposed;
 
 use super::checks::check_kinks;
 use super::events::Severed;
@@ -13,8 +16,8 @@ use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::slopes::directions;
-use crate::sensitivity::varied::Varied;
 use carried::{Along, AlongPiece, Carried, END, Reached, START};
+use jump::Jump;
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
@@ -154,8 +157,8 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         let model = self.model.clone();
         let event = severed.event;
         let node = Node::of(event.t, &event.state(), event.v);
-        let velocity = model.velocity_along(&node);
-        let times = (self.carried).times(&*model, severed, &*velocity, &reached)?;
+        let jump = Jump::at(&*model, severed, &node, &reached.rate);
+        let times = self.carried.times(&jump, &reached.at)?;
         let Reached { at, rate } = reached;
         // The start of the element, differentiated by the state at the event at a fixed time.
         let back = self.inverse(&at, severed)?;

@@ -185,8 +185,8 @@ impl<'m> Cut<'m> {
 /// A record of what happened between two elements.
 #[cfg_attr(not(feature = "sparse"), expect(dead_code))]
 pub(super) enum Between<'m, M> {
-    /// A recorded node.
-    Node(Node<0, RunTimeLength>),
+    /// A recorded node, by its index in [`Motion::states`].
+    Node(usize),
     /// An event that cut the element before it, or that fell on the start of the next element.
     Cut(Box<Cut<'m>>),
     /// The action at that event has been performed.
@@ -198,9 +198,11 @@ pub(super) enum Between<'m, M> {
 /// The elements so far, and the records between them.
 pub(super) struct Trail<'m, M> {
     pub(super) elements: Vec<Element>,
-    /// Records with the number of elements before them. Nodes are recorded only if they are kept.
+    /// Records with the number of elements before them. Nodes are recorded only if they are asked for.
     pub(super) between: Vec<(usize, Between<'m, M>)>,
     keeps_nodes: bool,
+    /// The number of nodes so far.
+    nodes: usize,
     /// Whether events that end elements are recorded; otherwise they are refused.
     takes_cuts: bool,
     /// Whether an event has ended an element.
@@ -222,6 +224,7 @@ impl<'m, M: family::Model> Trail<'m, M> {
             elements: Vec::new(),
             between: Vec::new(),
             keeps_nodes: false,
+            nodes: 0,
             takes_cuts: false,
             is_cut: false,
             reached: 0,
@@ -240,7 +243,7 @@ impl<'m, M: family::Model> Trail<'m, M> {
         }
     }
 
-    /// The same, for a trail that keeps the recorded nodes.
+    /// The same, for a trail that tells where the recorded nodes are.
     pub(super) fn with_nodes() -> Self {
         Self {
             keeps_nodes: true,
@@ -406,10 +409,11 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M>
         ControlFlow::Continue(())
     }
 
-    fn recorded(&mut self, node: &Node<0, RunTimeLength>) {
+    fn recorded(&mut self, _: &Node<0, RunTimeLength>) {
         if self.keeps_nodes {
-            self.add(Between::Node(node.clone()));
+            self.add(Between::Node(self.nodes));
         }
+        self.nodes += 1;
     }
 }
 

@@ -18,8 +18,9 @@ use tfe::sensitivity::Sensitive;
     force(y[i]) = -c*dot(y[i]) + sin(3*t),
     event(ground) = y[0] - a*sin(t),
     output(speed) = dot(y[0]) + g,
+    output(clock) = t,
 )]
-struct Balls {
+pub(super) struct Balls {
     n: usize,
     m: Vec<f64>,
     g: f64,
@@ -35,8 +36,9 @@ struct Balls {
     force(y[i]) = -c*dot(y[i]) + sin(3*t),
     event(ground) = y[0] - a*sin(t),
     output(speed) = dot(y[0]) + g,
+    output(clock) = t,
 )]
-struct ThreeBalls {
+pub(super) struct ThreeBalls {
     m: [f64; 3],
     g: f64,
     k: f64,
@@ -50,7 +52,7 @@ struct ThreeBalls {
     hamiltonian = sum(i in 0..n, p[i]^2/2/m + k*q[i]^4/4) + sum(i in 0..n-1, (q[i+1]-q[i])^2/2),
     event(fast) = p[0] - limit,
 )]
-struct ByMomenta {
+pub(super) struct ByMomenta {
     n: usize,
     m: f64,
     k: f64,
@@ -62,18 +64,18 @@ struct ByMomenta {
     hamiltonian = sum(i in 0..2, p[i]^2/2/m + k*q[i]^4/4) + (q[1]-q[0])^2/2,
     event(fast) = p[0] - limit,
 )]
-struct TwoByMomenta {
+pub(super) struct TwoByMomenta {
     m: f64,
     k: f64,
     limit: f64,
 }
 
 const MASSES: [f64; 3] = [1.0, 0.5, 0.8];
-const Y: [f64; 3] = [0.6, 1.5, 2.7];
-const V: [f64; 3] = [0.1, -0.2, 0.3];
-const G: f64 = 9.81;
+pub(super) const Y: [f64; 3] = [0.6, 1.5, 2.7];
+pub(super) const V: [f64; 3] = [0.1, -0.2, 0.3];
+pub(super) const G: f64 = 9.81;
 
-fn balls(g: f64) -> Balls {
+pub(super) fn balls(g: f64) -> Balls {
     Balls {
         n: 3,
         m: MASSES.to_vec(),
@@ -84,7 +86,7 @@ fn balls(g: f64) -> Balls {
     }
 }
 
-const THREE: ThreeBalls = ThreeBalls {
+pub(super) const THREE: ThreeBalls = ThreeBalls {
     m: MASSES,
     g: G,
     k: 40.0,
@@ -92,16 +94,30 @@ const THREE: ThreeBalls = ThreeBalls {
     a: 0.1,
 };
 
-fn long(balls: &Balls) -> family::Simulation<'_, Balls> {
+pub(super) fn long(balls: &Balls) -> family::Simulation<'_, Balls> {
     Simulation::new(balls).element(Mixed::<6>).step(0.05)
 }
 
-fn fixed() -> Simulation<'static, ThreeBalls, 3> {
+pub(super) fn fixed() -> Simulation<'static, ThreeBalls, 3> {
     Simulation::new(&THREE).element(Mixed::<6>).step(0.05)
 }
 
+/// The same model by momenta with both kinds of length, and a start.
+pub(super) fn by_momenta(limit: f64) -> (ByMomenta, TwoByMomenta, tfe::runtime::State<2>) {
+    let (m, k) = (1.5, 2.0);
+    let (q, p) = ([-0.9, 0.4], [0.0, 0.1]);
+    (
+        ByMomenta { n: 2, m, k, limit },
+        TwoByMomenta { m, k, limit },
+        tfe::runtime::State { q, p },
+    )
+}
+
 /// The largest difference of two lists of numbers, relative to the largest of these numbers, but at least to 1.
-fn apart<'a>(a: impl IntoIterator<Item = &'a f64>, b: impl IntoIterator<Item = &'a f64>) -> f64 {
+pub(super) fn apart<'a>(
+    a: impl IntoIterator<Item = &'a f64>,
+    b: impl IntoIterator<Item = &'a f64>,
+) -> f64 {
     let (a, b): (Vec<f64>, Vec<f64>) = (
         a.into_iter().copied().collect(),
         b.into_iter().copied().collect(),
@@ -290,14 +306,7 @@ fn derivatives_go_to_events_that_end_the_run() {
 
 #[test]
 fn derivatives_by_momenta_go_through_events() {
-    let (m, k, limit) = (1.5, 2.0, 0.4);
-    let long = ByMomenta { n: 2, m, k, limit };
-    let two = TwoByMomenta { m, k, limit };
-    let (q, p) = ([-0.9, 0.4], [0.0, 0.1]);
-    let start = family::FamilyState {
-        q: q.to_vec(),
-        p: p.to_vec(),
-    };
+    let (long, two, start) = by_momenta(0.4);
     let run = Simulation::new(&long).element(Mixed::<6>).step(0.1);
     let run = run.on("fast", Crossing::Rising, |event| {
         Act::Restart(family::FamilyState {
@@ -312,9 +321,10 @@ fn derivatives_by_momenta_go_through_events() {
             p: [-event.p[0], event.p[1] * event.q[0]],
         })
     });
-    let found = run.run_sensitive(start, 0.0..4.0).expect("derivatives");
+    let found = run.run_sensitive(of_heap(&start), 0.0..4.0);
+    let found = found.expect("derivatives");
     assert!(found.motion().events().len() > 1);
-    let expected = beside.run_sensitive(tfe::runtime::State { q, p }, 0.0..4.0);
+    let expected = beside.run_sensitive(start, 0.0..4.0);
     check_same(&found, &expected.expect("derivatives"), &[0.37, 1.9, 3.05]);
 }
 
@@ -406,14 +416,7 @@ fn impulses_at_events_are_told() {
 /// An impulse that causes an event: the time of the event is that of the impulse, and does not change.
 #[test]
 fn derivatives_go_through_events_of_impulses() {
-    let (m, k, limit) = (1.5, 2.0, 3.0);
-    let long = ByMomenta { n: 2, m, k, limit };
-    let two = TwoByMomenta { m, k, limit };
-    let (q, p) = ([-0.9, 0.4], [0.0, 0.1]);
-    let start = family::FamilyState {
-        q: q.to_vec(),
-        p: p.to_vec(),
-    };
+    let (long, two, start) = by_momenta(3.0);
     let run = Simulation::new(&long).element(Mixed::<6>).step(0.1);
     let run = run.impulse(0.8, [4.0, 0.5]);
     let run = run.on("fast", Crossing::Rising, |event| {
@@ -424,10 +427,11 @@ fn derivatives_go_through_events_of_impulses() {
     let beside = beside.on("fast", Crossing::Rising, |event| {
         Act::Impulse([-event.p[0], event.q[0]])
     });
-    let found = run.run_sensitive(start, 0.0..2.0).expect("derivatives");
+    let found = run.run_sensitive(of_heap(&start), 0.0..2.0);
+    let found = found.expect("derivatives");
     assert_eq!(found.motion().events().len(), 1);
     assert!(found.by("m").event_time(0).is_some_and(|dt| dt == 0.0));
-    let expected = beside.run_sensitive(tfe::runtime::State { q, p }, 0.0..2.0);
+    let expected = beside.run_sensitive(start, 0.0..2.0);
     check_same(
         &found,
         &expected.expect("derivatives"),

@@ -8,5 +8,6 @@ mod largest;
 
 mod constrained;
 mod events;
+mod gradients;
 mod orbits;
 mod transitions;

@@ -24,7 +24,7 @@ pub(in crate::simulation) enum Value<'m, V> {
 const DISTANCE: f64 = 2e-3;
 
 /// The same in time; not a simple fraction of common periods.
-const DISTANCE_IN_TIME: f64 = 1.570_796e-3;
+pub(in crate::simulation) const DISTANCE_IN_TIME: f64 = 1.570_796e-3;
 
 impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
     /// The gradients g_q and g_t; `None` if g depends on velocities.

@@ -10,33 +10,9 @@ use std::ops::Range;
 use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
-    super::super::mesh::within, super::super::retrace::operator_failed,
-    super::super::trail::is_same, super::view::View, crate::error::RunErrorKind,
-    crate::sensitivity::loss::Seen, std::convert::identity,
+    super::super::mesh::within, super::super::trail::is_same, super::backward::Backward,
+    crate::error::RunErrorKind, std::convert::identity,
 };
-
-/// Why there is no gradient.
-#[cfg(feature = "sparse")]
-enum Failure {
-    /// An element has no derivative.
-    Element(family::OperatorError),
-    /// The loss has no derivative.
-    Loss(RunErrorKind),
-}
-
-#[cfg(feature = "sparse")]
-impl From<family::OperatorError> for Failure {
-    fn from(error: family::OperatorError) -> Self {
-        Self::Element(error)
-    }
-}
-
-#[cfg(feature = "sparse")]
-impl From<RunErrorKind> for Failure {
-    fn from(kind: RunErrorKind) -> Self {
-        Self::Loss(kind)
-    }
-}
 
 impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// Runs over the span as [`run`](Self::run) does, and returns a loss of the motion with its gradient with respect
@@ -47,13 +23,21 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// function of nodes is given by [`Loss::of_end`].
     ///
     /// With [`record_every`](Self::record_every) only every k-th node is kept, and the motion between two of these is
-    /// computed again on the way back: about k + n/k of n nodes are in memory, for the time of one more run.
+    /// computed again on the way back: about k + n/k of n nodes are in memory, for the time of one more run. Runs with
+    /// [events](Self::on) keep all nodes.
+    ///
+    /// At an event that changes the state the gradient includes the change of the state and that of the time of the
+    /// event. The functions given to `on` are then called some 24 times for each coordinate and 12 times for each
+    /// parameter, with nearby states, for differences of sixth order; the elements beside such an event are solved with
+    /// sparse factors.
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::NoOutput`](crate::RunErrorKind::NoOutput) or
     /// [`RunErrorKind::Loss`](crate::RunErrorKind::Loss) if the loss does not fit the model or the span.
-    /// [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, for events that
-    /// change the state or end the run, and if steps were so long that they had to be cut.
+    /// [`RunErrorKind::Transition`](crate::RunErrorKind::Transition) if an event has no derivative,
+    /// [`RunErrorKind::SetUnsupported`](crate::RunErrorKind::SetUnsupported) if an event [sets](crate::Act::Set) a
+    /// parameter. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`; with
+    /// constraints, for events that change the state or end the run; and if steps were so long that they had to be cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn gradient(
         &self,
@@ -79,7 +63,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             }
         }
         let run = run.record_every(1);
-        let (motion, trail) = run.trailed("gradient", start, &span, Trail::new())?;
+        let (motion, trail) = run.trailed("gradient", start, &span, Trail::with_nodes())?;
         #[cfg(feature = "sparse")]
         return run.pulled(motion, &trail, loss);
         // Such a model was refused above.
@@ -103,13 +87,12 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             Ok(seen) => seen,
             Err(kind) => return Err(RunError::new(kind, motion)),
         };
-        let backwards = self.backwards();
-        let gone = backwards.and_then(|mut backwards| {
-            self.back(&mut backwards, (&motion, trail), &seen)?;
-            Ok(backwards)
+        let gone = self.backward().and_then(|mut backward| {
+            backward.pass((&motion, trail), &seen)?;
+            Ok(backward)
         });
         match gone {
-            Ok(backwards) => Ok((value, self.gathered(motion, &backwards)?)),
+            Ok(backward) => Ok((value, self.gathered(motion, &backward)?)),
             Err(kind) => Err(RunError::new(kind, motion)),
         }
     }
@@ -125,8 +108,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     ) -> Result<Option<(f64, LossGradient<0, RunTimeLength>)>, RunError<0, RunTimeLength>> {
         let motion = self.drive(start.clone(), span, identity, None)?;
         match self.descended(&motion, span, loss) {
-            Ok(Some((value, backwards))) => {
-                let gradient = self.gathered(motion, &backwards)?;
+            Ok(Some((value, backward))) => {
+                let gradient = self.gathered(motion, &backward)?;
                 Ok(Some((value, gradient)))
             }
             Ok(None) => Ok(None),
@@ -140,7 +123,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         motion: &Motion<0, RunTimeLength>,
         span: &Range<f64>,
         loss: &Loss<'_, 0, RunTimeLength>,
-    ) -> Result<Option<(f64, family::Backwards<'_, M>)>, RunErrorKind> {
+    ) -> Result<Option<(f64, Backward<'_, M>)>, RunErrorKind> {
         let mesh = self.mesh(span)?;
         let times: Vec<f64> = mesh.elements().map(|(_, next, _)| next).collect();
         let segments = times.len().div_ceil(self.record_every);
@@ -149,7 +132,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         if statistics.cuts > 0 || statistics.kinks > 0 || !is_plain {
             return Ok(None);
         }
-        let mut backwards = self.backwards()?;
+        let mut backward = self.backward()?;
         let mut sum = 0.0;
         for (segment, times) in times.chunks(self.record_every).enumerate().rev() {
             let [before, after] = [segment, segment + 1].map(|node| &motion.states()[node]);
@@ -165,7 +148,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 "gradient",
                 before.state(),
                 &(before.t..after.t),
-                Trail::new(),
+                Trail::with_nodes(),
             );
             let Ok((again, trail)) = again else {
                 return Ok(None);
@@ -178,68 +161,25 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             }
             let (value, seen) = part.seen(&again, &*self.model)?;
             sum += value;
-            self.back(&mut backwards, (&again, &trail), &seen)?;
+            backward.pass((&again, &trail), &seen)?;
         }
-        Ok(Some((sum, backwards)))
+        Ok(Some((sum, backward)))
     }
 
     #[cfg(feature = "sparse")]
-    fn backwards(&self) -> Result<family::Backwards<'_, M>, RunErrorKind> {
-        let element = self.chosen_element();
-        let made = family::Backwards::new(&*self.model, element, self.control);
-        made.map_err(|error| operator_failed(error, None, "gradient"))
-    }
-
-    /// Passes backward over a motion.
-    #[cfg(feature = "sparse")]
-    fn back(
-        &self,
-        backwards: &mut family::Backwards<'_, M>,
-        (motion, trail): (&Motion<0, RunTimeLength>, &Trail<'m, M>),
-        seen: &Seen,
-    ) -> Result<(), RunErrorKind> {
-        let mut view = View::new(&*self.model, seen, &motion.last().v);
-        let elements = &trail.elements;
-        let mut number = elements.len();
-        let mut go = || -> Result<(), Failure> {
-            loop {
-                let node = &motion.states()[number];
-                if let Some(partials) = view.of_node(number) {
-                    let state = node.state();
-                    backwards.see(node.t, (&state, &node.v), &partials)?;
-                }
-                let Some(before) = number.checked_sub(1) else {
-                    return Ok(());
-                };
-                number = before;
-                let element = &elements[number];
-                let inside = view.of_element(backwards, &motion.elements()[number])?;
-                let place = (element.t, element.h);
-                let end = backwards.pass(place, &element.before, inside.first())?;
-                element.check(&*self.model, &end, self.control.tolerance)?;
-                if let Some(kicked) = &element.kicked {
-                    backwards.kick(element.t, &kicked.with)?;
-                }
-            }
-        };
-        go().map_err(|failure| match failure {
-            Failure::Element(error) => {
-                let element = elements.get(number);
-                operator_failed(error, element, "gradient")
-            }
-            Failure::Loss(kind) => kind,
-        })
+    fn backward(&self) -> Result<Backward<'_, M>, RunErrorKind> {
+        Backward::new(&*self.model, self.chosen_element(), self.control)
     }
 
     #[cfg(feature = "sparse")]
     fn gathered(
         &self,
         motion: Motion<0, RunTimeLength>,
-        backwards: &family::Backwards<'_, M>,
+        backward: &Backward<'_, M>,
     ) -> Result<LossGradient<0, RunTimeLength>, RunError<0, RunTimeLength>> {
         let names = 0..self.model.parameters();
         let names = names.map(|at| self.model.parameter_name(at).to_string());
-        let (by_parameters, by_start) = (backwards.by_parameters(), backwards.by_state());
+        let (by_parameters, by_start) = (backward.by_parameters(), backward.by_start());
         LossGradient::new(motion, names.collect(), by_parameters, by_start)
     }
 }

@@ -3,12 +3,14 @@
 use crate::error::RunErrorKind;
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length, Polynomial};
-use crate::motion::points::{Point, Points};
+use crate::motion::points::Points;
 use crate::motion::{AtError, Node};
 use crate::sensitivity::Sensitive;
-use crate::sensitivity::inside::Moved;
 use crate::sensitivity::loss::{By, Seen};
-use crate::sensitivity::slopes::{Along, Change, Place};
+use crate::sensitivity::slopes::Change;
+use crate::sensitivity::varied::Varied;
+use crate::simulation::events::value::output_slopes;
+use crate::simulation::kind::Simulated;
 use tfe_runtime::step::DenseElement;
 use tfe_runtime::{InsideLoss, Model, Partials, Pull, Sight, State};
 #[cfg(feature = "sparse")]
@@ -156,32 +158,58 @@ impl<'a, M: Evaluate<N, L>, const N: usize, L: Length<N>> View<'a, M, N, L> {
     }
 }
 
-impl<M: Model<N>, const N: usize> View<'_, M, N> {
+/// The derivatives by times that events move.
+impl<M, const N: usize, L> View<'_, M, N, L>
+where
+    M: Simulated<N, L> + Varied<N, L>,
+    L: Length<N>,
+{
     /// The derivative of the direct contribution of a node by its time, at fixed state.
-    pub(super) fn by_time(&self, number: usize, node: &Node<N>) -> f64 {
+    pub(super) fn by_time(&self, number: usize, node: &Node<N, L>) -> f64 {
         let Some(partials) = self.of_node(number) else {
             return 0.0;
         };
-        let Node { t, q, p, v } = node;
-        let place = Place { t: *t, q, p, v };
-        let along = Along::new(self.model, place);
-        let change = Change {
-            t: 1.0,
-            ..Change::ZERO
-        };
-        let velocity = along.velocity(&change);
-        let outputs = along.outputs(&change, &velocity);
+        let (velocity, outputs) = by_time(self.model, node);
         let explicit = self.seen.of_node(number).iter().map(|look| match &look.by {
             By::Output(..) => 0.0,
             By::Node { t, .. } => *t,
         });
-        let by_velocity = partials.v.iter().zip(&velocity);
+        let by_velocity = partials.v.iter().zip(velocity.as_ref());
         let by_outputs = partials.outputs.iter().zip(&outputs);
         let products = by_velocity.chain(by_outputs);
         let products = products.filter(|(factor, _)| **factor != 0.0);
         explicit.sum::<f64>() + products.map(|(factor, slope)| factor * slope).sum::<f64>()
     }
 
+    /// The derivatives of the integrals over a piece of an element by the times of its start and its end, at a fixed
+    /// polynomial: quadrature points move, and the length changes.
+    pub(super) fn by_ends(&mut self, piece: &L::Polynomial) -> Result<[f64; 2], RunErrorKind> {
+        let (model, factors, length) = (self.model, &self.running.outputs, piece.length());
+        let mut by_ends = [0.0; 2];
+        if self.seen.integrals.is_empty() {
+            return Ok(by_ends);
+        }
+        self.points.of(model, piece, |point| {
+            let node = Node::<N, L>::of(point.t, &point.state, point.velocity);
+            let (_, slopes) = by_time(model, &node);
+            let mut values = vec![0.0; factors.len()];
+            model.outputs(node.t, (&node.q, &node.p), &node.v, &mut values);
+            for (factor, (slope, value)) in factors.iter().zip(slopes.iter().zip(&values)) {
+                if *factor == 0.0 {
+                    continue;
+                }
+                let weight = point.weight * factor;
+                let (moved, stretched) = (weight * slope, weight * value / length);
+                by_ends[0] += moved * (1.0 - point.tau) - stretched;
+                by_ends[1] += moved * point.tau + stretched;
+            }
+            Ok::<_, Unseen>(())
+        })?;
+        Ok(by_ends)
+    }
+}
+
+impl<M: Model<N>, const N: usize> View<'_, M, N> {
     /// Adds the derivatives of the integrals over all elements, times the sensitivities along them, by the start, in
     /// the order (p, q), and by parameters. Explicit derivatives by parameters are left to the sums.
     pub(super) fn add_along(
@@ -204,53 +232,31 @@ impl<M: Model<N>, const N: usize> View<'_, M, N> {
                 *sum += own;
             }
             if let Some(moved) = &inside.moved {
-                let length = piece.length();
-                let (model, outputs) = (self.model, &self.running.outputs);
-                self.points.of(model, piece, |point| {
-                    add_moving((model, outputs), &point, (moved, length), all);
-                    Ok::<_, Unseen>(())
-                })?;
+                for (by_end, times) in self.by_ends(piece)?.iter().zip(&moved.ends) {
+                    for (sum, dt) in all.iter_mut().zip(times) {
+                        *sum += by_end * dt;
+                    }
+                }
             }
         }
         Ok(())
     }
 }
 
-/// Adds the effect of moving quadrature points and element lengths on the integrals.
-fn add_moving<M: Model<N>, const N: usize>(
-    (model, factors): (&M, &[f64]),
-    point: &Point<N, FixedLength>,
-    (moved, length): (&Moved, f64),
-    all: &mut [f64],
-) {
-    let Point {
-        tau,
-        t,
-        weight,
-        state,
-        velocity,
-    } = point;
-    let place = Place {
-        t: *t,
-        q: &state.q,
-        p: &state.p,
-        v: velocity,
-    };
-    let along = Along::new(model, place);
+/// The derivatives of the velocity and of the outputs by the time, at a fixed state.
+fn by_time<M, L, const N: usize>(model: &M, node: &Node<N, L>) -> (L::Vector, Vec<f64>)
+where
+    M: Simulated<N, L> + Varied<N, L>,
+    L: Length<N>,
+{
     let change = Change {
         t: 1.0,
-        ..Change::ZERO
+        ..Change::<N, L>::by(None, &node.q)
     };
-    let by_time = along.outputs(&change, &along.velocity(&change));
-    let mut values = vec![0.0; factors.len()];
-    model.outputs(*t, (&state.q, &state.p), velocity, &mut values);
-    let (times, lengths) = (moved.time(*tau), moved.length() / length);
-    for (column, sum) in all.iter_mut().enumerate() {
-        for (output, factor) in factors.iter().enumerate() {
-            let slope = by_time[output] * times[column] + values[output] * lengths[column];
-            *sum += weight * factor * slope;
-        }
-    }
+    let velocity = (model.velocity_along(node))(&change);
+    let place = (node.t, &node.q, &node.p, &node.v);
+    let outputs = output_slopes(model, place, &change, &velocity);
+    (velocity, outputs)
 }
 
 /// The loss has no derivatives at a place.

@@ -1,12 +1,13 @@
 //! Derivatives of the actions of events, by difference quotients (T-124).
 
+use super::jump::Jump;
 use crate::differences::{SIXTH, derivative, derivative_of_either};
 use crate::error::RunErrorKind;
 use crate::length::Length;
 use crate::numbers::{larger, largest};
 use crate::sensitivity::slopes::Change;
+use crate::simulation::events::Watched;
 use crate::simulation::events::act::{Act, Near, Occurrence, On, state_after};
-use crate::simulation::events::{Severed, Watched};
 use crate::simulation::kind::Simulated;
 use nalgebra::DMatrix;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,34 +15,29 @@ use tfe_runtime::StepError;
 use tfe_runtime::transition::TransitionError;
 
 /// The relative step of difference quotients. Their truncation error is below the rounding error, which is about 1e-13.
-const DISTANCE: f64 = 2e-3;
+pub(super) const DISTANCE: f64 = 2e-3;
 
 /// An event with the derivatives of its state and of its time before the action.
 pub(super) struct Acting<'a, 'm, M, const N: usize, L: Length<N>> {
-    pub(super) model: &'a M,
-    /// The change of the velocity for a change at the event.
-    pub(super) velocity: &'a dyn Fn(&Change<N, L>) -> L::Vector,
-    pub(super) severed: &'a Severed<'a, 'm, N, L>,
+    pub(super) jump: &'a Jump<'a, 'm, M, N, L>,
     /// The derivatives of the state at the event, a column for each component of the start and each parameter.
     pub(super) at: &'a DMatrix<f64>,
-    /// ẏ at the event.
-    pub(super) rate: &'a DMatrix<f64>,
     /// The derivatives of its time.
     pub(super) times: &'a [f64],
 }
 
-/// How an event moves with the quantity of one column.
-struct Way<const N: usize, L: Length<N>> {
-    change: Change<N, L>,
-    time: f64,
+/// How an event moves with a quantity, such as that of one column.
+pub(super) struct Way<const N: usize, L: Length<N>> {
+    pub(super) change: Change<N, L>,
+    pub(super) time: f64,
     /// The index of the parameter, if the quantity is one.
-    parameter: Option<usize>,
+    pub(super) parameter: Option<usize>,
     /// The change of the velocity due to the parameter.
-    velocity: L::Vector,
+    pub(super) velocity: L::Vector,
     /// The step of difference quotients.
-    distance: f64,
+    pub(super) distance: f64,
     /// A longer step, which is tried first for a parameter alone: an action may add numbers of the size of 1 to it.
-    longer: Option<f64>,
+    pub(super) longer: Option<f64>,
 }
 
 /// A positive scale for changes.
@@ -49,46 +45,50 @@ fn scale(size: f64) -> f64 {
     if size > 0.0 { size } else { 1.0 }
 }
 
-impl<M, const N: usize, L> Acting<'_, '_, M, N, L>
+impl<M, const N: usize, L> Jump<'_, '_, M, N, L>
 where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    fn coordinates(&self) -> usize {
-        self.at.nrows() / 2
+    /// No motion.
+    pub(super) fn still(&self) -> Way<N, L> {
+        let event = self.severed.event;
+        Way {
+            change: Change::by(None, &event.q),
+            time: 0.0,
+            parameter: None,
+            velocity: L::zero(&event.v),
+            distance: DISTANCE,
+            longer: None,
+        }
     }
 
-    /// The derivatives after the action; `parameter` returns the parameter of a column.
-    pub(super) fn after(
-        &self,
-        parameter: impl Fn(usize) -> Option<usize>,
-    ) -> Result<DMatrix<f64>, TransitionError> {
-        let n = self.coordinates();
-        let mut after = self.at.clone();
-        for column in 0..self.times.len() {
-            after.column_mut(column).fill(0.0);
-            for way in self.ways(column, parameter(column)) {
-                if let Some(longer) = way.longer {
-                    for row in 0..2 * n {
-                        after[(row, column)] += self.alone(&way, longer, row)?;
-                    }
-                    continue;
-                }
-                for (k, weight) in (1..).zip(SIXTH) {
-                    let s = f64::from(k) * way.distance;
-                    let (high, low) = (self.moved(&way, s)?, self.moved(&way, -s)?);
-                    let pairs = high.iter().zip(&low);
-                    for (row, (high, low)) in pairs.enumerate() {
-                        after[(row, column)] += weight * (high - low) / way.distance;
-                    }
-                }
-            }
-        }
-        Ok(after)
+    /// The effect of a parameter alone, with a longer step of differences.
+    pub(super) fn by_parameter(&self, index: usize) -> (Way<N, L>, f64) {
+        let size = scale(self.model.parameter_value(index).abs());
+        let change = Change::by(Some(index), &self.severed.event.q);
+        let way = Way {
+            parameter: Some(index),
+            velocity: (self.velocity)(&change),
+            distance: DISTANCE * size,
+            ..self.still()
+        };
+        (way, DISTANCE * size.max(1.0))
+    }
+
+    /// The scales of coordinates and of momenta. At an event something vanishes, possibly the only coordinate; the
+    /// change over a step is then the better scale.
+    pub(super) fn scales(&self) -> (f64, f64) {
+        let (event, step) = (self.severed.event, self.severed.step.abs());
+        let of = |values: &L::Vector, rate: &L::Vector| {
+            let values = largest(values.as_ref());
+            scale(larger(values, step * largest(rate.as_ref())))
+        };
+        (of(&event.q, &self.rate.q), of(&event.p, &self.rate.p))
     }
 
     /// The state after the action for an event that has moved by `s`, in the order (p, q).
-    fn moved(&self, way: &Way<N, L>, s: f64) -> Result<Vec<f64>, TransitionError> {
+    pub(super) fn moved(&self, way: &Way<N, L>, s: f64) -> Result<Vec<f64>, TransitionError> {
         let by = (&self.severed.watched.on, &self.severed.watched.value);
         let found = state_after(self.model, by, self.severed.event, &self.near(way, s));
         let found = found.filter(|found| self.model.check_start(found, &[]).is_ok());
@@ -97,16 +97,75 @@ where
         Ok([p.as_ref(), q.as_ref()].concat())
     }
 
-    /// The derivative by a parameter alone of a component of the state after the action, in the order (p, q).
-    fn alone(&self, way: &Way<N, L>, longer: f64, row: usize) -> Result<f64, TransitionError> {
+    /// The derivative, along one quantity, of a number that depends on the state after the action, which is given in
+    /// the order (p, q).
+    pub(super) fn derivative(
+        &self,
+        way: &Way<N, L>,
+        longer: f64,
+        of: impl Fn(&[f64]) -> f64,
+    ) -> Result<f64, TransitionError> {
         let slope = derivative_of_either([longer, way.distance], |s| {
             let numbers = self.moved(way, s);
-            numbers.map_or(f64::NAN, |numbers| numbers[row])
+            numbers.map_or(f64::NAN, |numbers| of(&numbers))
         });
         match slope.is_finite() {
             true => Ok(slope),
             false => Err(StepError::NonFinite.into()),
         }
+    }
+
+    /// The event moved by `s`.
+    fn near(&self, way: &Way<N, L>, s: f64) -> Near<N, L> {
+        let event = self.severed.event;
+        let moved = |from: &L::Vector, by: &L::Vector| {
+            let by = by.as_ref();
+            L::from_fn(from, |a| from.as_ref()[a] + s * by[a])
+        };
+        Near {
+            t: event.t + s * way.time,
+            state: L::state(
+                moved(&event.q, &way.change.q),
+                moved(&event.p, &way.change.p),
+            ),
+            velocity: L::from_fn(&event.v, |a| s * way.velocity.as_ref()[a]),
+            parameter: way.parameter.map(|index| (index, s)),
+        }
+    }
+}
+
+impl<M, const N: usize, L> Acting<'_, '_, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    /// The derivatives after the action; `parameter` returns the parameter of a column.
+    pub(super) fn after(
+        &self,
+        parameter: impl Fn(usize) -> Option<usize>,
+    ) -> Result<DMatrix<f64>, TransitionError> {
+        let jump = self.jump;
+        let mut after = self.at.clone();
+        for (column, mut after) in after.column_iter_mut().enumerate() {
+            after.fill(0.0);
+            for way in self.ways(column, parameter(column)) {
+                if let Some(longer) = way.longer {
+                    for (row, after) in after.iter_mut().enumerate() {
+                        *after += jump.derivative(&way, longer, |numbers| numbers[row])?;
+                    }
+                    continue;
+                }
+                for (k, weight) in (1..).zip(SIXTH) {
+                    let s = f64::from(k) * way.distance;
+                    let (high, low) = (jump.moved(&way, s)?, jump.moved(&way, -s)?);
+                    let pairs = high.iter().zip(&low);
+                    for (after, (high, low)) in after.iter_mut().zip(pairs) {
+                        *after += weight * (high - low) / way.distance;
+                    }
+                }
+            }
+        }
+        Ok(after)
     }
 
     /// The error of an action that sets a parameter to a value which depends on the state: the later motion also
@@ -115,7 +174,7 @@ where
         /// The largest relative change of a value that is attributed to rounding, for a relative change 1 of the state.
         const ROUNDINGS: f64 = 1e-10;
 
-        let Watched { on, value } = self.severed.watched;
+        let Watched { on, value } = self.jump.severed.watched;
         // Records the values that the action sets at each call.
         let seen = Arc::new(Mutex::new(None));
         let (act, sets) = (Arc::clone(&on.act), Arc::clone(&seen));
@@ -132,11 +191,16 @@ where
             ..on.clone()
         };
         let set = |way: &Way<N, L>, s: f64| {
-            let near = self.near(way, s);
-            let _ = state_after(self.model, (&on, value), self.severed.event, &near);
+            let near = self.jump.near(way, s);
+            let _ = state_after(
+                self.jump.model,
+                (&on, value),
+                self.jump.severed.event,
+                &near,
+            );
             seen.lock().unwrap_or_else(PoisonError::into_inner).take()
         };
-        let names = self.model.parameter_names();
+        let names = self.jump.model.parameter_names();
         for way in (0..self.times.len()).filter_map(|column| self.motion(column)) {
             for (place, (name, value)) in set(&way, 0.0)?.into_iter().enumerate() {
                 // NaN if the action sets something else nearby.
@@ -147,12 +211,12 @@ where
                 };
                 let change = derivative(way.distance, nearby) * way.distance / DISTANCE;
                 let known = names.iter().position(|own| own.is(&name));
-                let before = known.map_or(0.0, |index| self.model.parameter_value(index));
+                let before = known.map_or(0.0, |index| self.jump.model.parameter_value(index));
                 let size = larger(value.abs(), before.abs());
                 if !(change.abs() <= ROUNDINGS * size) {
                     return Some(RunErrorKind::SetByState {
-                        event: self.severed.event.name.clone(),
-                        time: self.severed.event.t,
+                        event: self.jump.severed.event.name.clone(),
+                        time: self.jump.severed.event.t,
                         parameter: name,
                     });
                 }
@@ -172,20 +236,11 @@ where
         let Some(index) = parameter else {
             return motion.into_iter().collect();
         };
-        let size = scale(self.model.parameter_value(index).abs());
-        let like = &self.severed.event.q;
-        let own = Way {
-            change: Change::by(None, like),
-            time: 0.0,
-            parameter,
-            velocity: (self.velocity)(&Change::by(parameter, like)),
-            distance: DISTANCE * size,
-            longer: None,
-        };
+        let (own, longer) = self.jump.by_parameter(index);
         match motion {
             None => vec![own],
             Some(motion) if motion.distance > TOGETHER * own.distance => {
-                let longer = Some(DISTANCE * size.max(1.0));
+                let longer = Some(longer);
                 vec![motion, Way { longer, ..own }]
             }
             Some(motion) => vec![Way {
@@ -199,42 +254,15 @@ where
 
     /// How the event moves with a column at fixed parameters; `None` if it does not.
     fn motion(&self, column: usize) -> Option<Way<N, L>> {
-        let event = self.severed.event;
-        let largest = |values: &L::Vector| largest(values.as_ref());
-        // At an event something vanishes, possibly the only coordinate; the change over a step is then the better
-        // scale.
-        let rate = Change::<N, L>::of_column(&event.q, self.rate, 0);
-        let step = self.severed.step.abs();
-        let q = scale(larger(largest(&event.q), step * largest(&rate.q)));
-        let p = scale(larger(largest(&event.p), step * largest(&rate.p)));
-        let change = Change::<N, L>::of_column(&event.q, self.at, column);
-        let size = larger(largest(&change.q) / q, largest(&change.p) / p);
+        let (q, p) = self.jump.scales();
+        let change = Change::<N, L>::of_column(&self.jump.severed.event.q, self.at, column);
+        let size = (largest(change.q.as_ref()) / q).max(largest(change.p.as_ref()) / p);
         let time = self.times[column];
         (size != 0.0 || time != 0.0).then(|| Way {
             change,
             time,
-            parameter: None,
-            velocity: L::zero(&event.v),
             distance: DISTANCE / scale(size),
-            longer: None,
+            ..self.jump.still()
         })
-    }
-
-    /// The event moved by `s`.
-    fn near(&self, way: &Way<N, L>, s: f64) -> Near<N, L> {
-        let event = self.severed.event;
-        let moved = |from: &L::Vector, by: &L::Vector| {
-            let by = by.as_ref();
-            L::from_fn(from, |a| from.as_ref()[a] + s * by[a])
-        };
-        Near {
-            t: event.t + s * way.time,
-            state: L::state(
-                moved(&event.q, &way.change.q),
-                moved(&event.p, &way.change.p),
-            ),
-            velocity: L::from_fn(&event.v, |a| s * way.velocity.as_ref()[a]),
-            parameter: way.parameter.map(|index| (index, s)),
-        }
     }
 }

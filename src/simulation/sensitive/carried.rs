@@ -1,6 +1,7 @@
 //! The derivatives along a run of a model of either kind of length: over events, and at recorded nodes (T-124).
 
 use super::acts::Acting;
+use super::jump::Jump;
 use crate::error::RunErrorKind;
 use crate::length::Length;
 use crate::motion::{Event, Motion, Node};
@@ -13,7 +14,7 @@ use crate::simulation::events::value::output_slopes;
 use crate::simulation::kind::Simulated;
 use nalgebra::{DMatrix, RowDVector};
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{CoordinateName, Direction, InsideSlopes, StepError};
+use tfe_runtime::{CoordinateName, Direction, InsideSlopes};
 
 /// The start of the element moves in time, its end does not.
 pub(in crate::simulation) const START: Direction = Direction {
@@ -161,47 +162,18 @@ impl Carried {
         Reached { at, rate }
     }
 
-    /// The derivative of the time of an event by each column, from g(t*, y(t*)) = 0: ġ dt* = −δg. If g has jumped over
-    /// zero at the start of an element, by an impulse or an action, the time is that of the start.
+    /// The derivatives of the time of an event by each column, from those of the state at a fixed time.
     pub(in crate::simulation) fn times<M, L, const N: usize>(
         &self,
-        model: &M,
-        severed: &Severed<'_, '_, N, L>,
-        velocity: &dyn Fn(&Change<N, L>) -> L::Vector,
-        Reached { at, rate }: &Reached,
+        jump: &Jump<'_, '_, M, N, L>,
+        at: &DMatrix<f64>,
     ) -> Result<Vec<f64>, TransitionError>
     where
-        M: Simulated<N, L>,
+        M: Simulated<N, L> + Varied<N, L>,
         L: Length<N>,
     {
-        /// The least distance of g from zero after a jump, relative to its change in a step.
-        const JUMPED: f64 = 1e-6;
-
-        let event = severed.event;
-        let value = &severed.watched.value;
-        let slope = |change: &Change<N, L>| value.slope(model, event, change, &velocity(change));
-        let by_time = slope(&Change {
-            t: 1.0,
-            ..Change::of_column(&event.q, rate, 0)
-        });
-        let left = value.at(model, event);
-        if !severed.inside && left.abs() > JUMPED * (severed.step * by_time).abs() {
-            let still = || vec![0.0; self.columns()];
-            return Ok(self.before.start.clone().unwrap_or_else(still));
-        }
-        let time = |column| {
-            let change = Change {
-                parameter: self.parameter(column),
-                ..Change::of_column(&event.q, at, column)
-            };
-            -slope(&change) / by_time
-        };
-        let times: Vec<f64> = (0..self.columns()).map(time).collect();
-        if times.iter().all(|dt| dt.is_finite()) {
-            Ok(times)
-        } else {
-            Err(StepError::NonFinite.into())
-        }
+        let start = self.before.start.as_deref();
+        jump.times(at, start, |column| self.parameter(column))
     }
 
     /// Keeps the derivatives along an element; `ends` are the derivatives of its end time, if an event ends it.
@@ -261,8 +233,8 @@ impl Carried {
     {
         let event = severed.event;
         let node = Node::of(event.t, &event.state(), event.v.clone());
-        let velocity = model.velocity_along(&node);
-        let times = self.times(model, severed, &*velocity, &reached)?;
+        let jump = Jump::at(model, severed, &node, &reached.rate);
+        let times = self.times(&jump, &reached.at)?;
         if let Some(along) = along {
             self.keep(along, Some(&times));
         }
@@ -273,11 +245,8 @@ impl Carried {
         (self.acted, self.dependent) = (None, None);
         if severed.goes_on {
             let acting = Acting {
-                model,
-                velocity: &*velocity,
-                severed,
+                jump: &jump,
                 at,
-                rate,
                 times: &times,
             };
             self.acted = Some(acting.after(|column| self.parameter(column))?);

@@ -69,21 +69,23 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 _ => carrying,
             },
             parameters: &parameters,
+            motion: &motion,
         };
         let done = self.retrace("run_sensitive", trail, &parameters, &mut course);
+        let carried = course.carrying.carried;
         if let Err(kind) = done {
             return Err(RunError::new(kind, motion));
         }
-        let carried = course.carrying.carried;
         Ok(carried.into_sensitive(motion, |index| model.parameter_name(index)))
     }
 }
 
 /// Carries the derivatives by the parameters along a run.
 #[cfg(feature = "sparse")]
-struct Course<'p> {
+struct Course<'a> {
     carrying: Carrying,
-    parameters: &'p [usize],
+    parameters: &'a [usize],
+    motion: &'a Motion<0, RunTimeLength>,
 }
 
 #[cfg(feature = "sparse")]
@@ -99,6 +101,10 @@ impl<'m, M: family::Model> Retrace<'m, M> for Course<'_> {
     }
 
     fn between(&mut self, model: &M, between: &Between<'m, M>) -> Result<(), RunErrorKind> {
+        if let Between::Node(number) = between {
+            let node = &self.motion.states()[*number];
+            self.carrying.carried.recorded(model, node);
+        }
         self.carrying.between(model, between)
     }
 }
@@ -229,7 +235,7 @@ impl Carrying {
         between: &Between<'_, M>,
     ) -> Result<(), RunErrorKind> {
         match between {
-            Between::Node(node) => self.carried.recorded(model, node),
+            Between::Node(_) => {}
             Between::Acted => self.carried.acted(),
             Between::Set(_) => return self.carried.set(),
             Between::Cut(cut) => {

@@ -15,7 +15,7 @@ use super::stepper::Stepper;
 use super::transition::pull::Seeds;
 use super::transition::{Ground, OperatorError, TransitionOperator};
 use super::view::View;
-use crate::condense::add_multiple;
+use crate::condense::{Direction, add_multiple};
 use crate::consistency::ModelError;
 use crate::element::Element;
 use crate::error::StepError;
@@ -301,6 +301,13 @@ impl<'m, M: Model> Backwards<'m, M> {
         Ok(())
     }
 
+    /// λ, which becomes zero: at an action that changes the state, the caller multiplies it by the derivative of the
+    /// action, and adds the product by [`see`](Self::see).
+    pub fn take_by_state(&mut self) -> Vec<f64> {
+        let none = vec![0.0; self.lambda.len()];
+        core::mem::replace(&mut self.lambda, none)
+    }
+
     /// Goes back over the element from t to t + h that begins at `before`, with the derivatives of the loss by its
     /// inside; the element is solved once more.
     ///
@@ -313,42 +320,58 @@ impl<'m, M: Model> Backwards<'m, M> {
         before: &FamilyState,
         inside: Option<&InsideLoss>,
     ) -> Result<FamilyState, OperatorError> {
-        let end = self.pass_inside((t, h), before, inside)?;
-        if let Some(inside) = inside {
-            add_multiple(&mut self.lambda, 1.0, &inside.start);
+        self.check_inside(inside)?;
+        if let Some(end) = self.pass_by_iteration((t, h), before, inside)? {
+            self.add_start(inside);
+            return Ok(end);
         }
-        Ok(end)
+        let transition = self.linearised((t, h), before, &[])?;
+        self.pass_linearised((t, h), &transition, inside)?;
+        Ok(transition.end().clone())
     }
 
-    fn pass_inside(
+    /// Solves the element from t to t + h that begins at `before` once more, with sparse factors and with its
+    /// derivatives along directions. [`pass_linearised`](Self::pass_linearised) goes back over it: if an event ends the
+    /// element, λ at its end depends on the derivative by its length.
+    ///
+    /// # Errors
+    /// As [`pass`](Self::pass).
+    pub fn linearised(
         &mut self,
         (t, h): (f64, f64),
         before: &FamilyState,
+        directions: &[Direction],
+    ) -> Result<TransitionOperator, OperatorError> {
+        let (view, ground) = (&self.view, &self.ground);
+        let table = &ground.table;
+        let mut rates = match self.rates.take() {
+            Some(rates) => rates.hand_over(view),
+            None => Rates::new(view, table.clone(), Control::default())?,
+        };
+        let transition = TransitionOperator::next(view, &mut rates, ground, before, (t, h));
+        let transition = transition.and_then(|mut transition| {
+            transition.answer(view, &rates, (t, h), directions)?;
+            Ok(transition)
+        });
+        for (l, point) in rates.points.iter().enumerate() {
+            let time = t + h * table.view().nodes[l];
+            self.places.set(l, time, &point.q, &point.v);
+        }
+        self.rates = Some(rates.hand_over(()));
+        transition
+    }
+
+    /// Goes back over the element from t to t + h that was [linearised](Self::linearised) last.
+    ///
+    /// # Errors
+    /// As [`pass`](Self::pass).
+    pub fn pass_linearised(
+        &mut self,
+        (t, h): (f64, f64),
+        transition: &TransitionOperator,
         inside: Option<&InsideLoss>,
-    ) -> Result<FamilyState, OperatorError> {
-        if let Some(inside) = inside {
-            let degree = self.ground.table.element().degree();
-            let needed = 2 * degree * self.view.model().len();
-            let given = inside.coefficients.len();
-            if given != needed {
-                return Err(OperatorError::Shape { needed, given });
-            }
-        }
-        let mut end = before.clone();
-        if self.iteration.is_some() {
-            let cuts = self.stepper.statistics().cuts;
-            self.stepper.advance(t, h, &mut end)?;
-            if self.stepper.statistics().cuts > cuts {
-                return Err(OperatorError::Cut);
-            }
-            let within = Within::of(inside, &self.ground.table.view(), h);
-            if self.iterate(t, h, &within) {
-                self.take_derivatives();
-                return Ok(end);
-            }
-        }
-        let transition = self.transition((t, h), before)?;
-        end.clone_from(transition.end());
+    ) -> Result<(), OperatorError> {
+        self.check_inside(inside)?;
         let seeds = transition.pull(inside, &mut self.lambda);
         if !self.lambda.iter().all(|one| one.is_finite()) {
             return Err(StepError::SingularTangent { unknown: 0 }.into());
@@ -358,28 +381,50 @@ impl<'m, M: Model> Backwards<'m, M> {
         if let Some(weights) = &seeds.held {
             self.take_derivatives_of_constraints((t, t + h), weights);
         }
-        Ok(end)
+        self.add_start(inside);
+        Ok(())
     }
 
-    /// The derivative of an element by its start, with sparse factors and the points.
-    fn transition(
+    /// Refuses derivatives by the inside of an element that are not those of its polynomial.
+    fn check_inside(&self, inside: Option<&InsideLoss>) -> Result<(), OperatorError> {
+        let degree = self.ground.table.element().degree();
+        let needed = 2 * degree * self.view.model().len();
+        match inside.map(|inside| inside.coefficients.len()) {
+            Some(given) if given != needed => Err(OperatorError::Shape { needed, given }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Adds the derivatives of the loss by the start of an element.
+    fn add_start(&mut self, inside: Option<&InsideLoss>) {
+        if let Some(inside) = inside {
+            add_multiple(&mut self.lambda, 1.0, &inside.start);
+        }
+    }
+
+    /// Goes back over an element by iteration, and returns its end; `None`, with λ unchanged, where the iteration does
+    /// not serve.
+    fn pass_by_iteration(
         &mut self,
         (t, h): (f64, f64),
         before: &FamilyState,
-    ) -> Result<TransitionOperator, OperatorError> {
-        let (view, ground) = (&self.view, &self.ground);
-        let table = &ground.table;
-        let mut rates = match self.rates.take() {
-            Some(rates) => rates.hand_over(view),
-            None => Rates::new(view, table.clone(), Control::default())?,
-        };
-        let transition = TransitionOperator::next(view, &mut rates, ground, before, (t, h));
-        for (l, point) in rates.points.iter().enumerate() {
-            let time = t + h * table.view().nodes[l];
-            self.places.set(l, time, &point.q, &point.v);
+        inside: Option<&InsideLoss>,
+    ) -> Result<Option<FamilyState>, OperatorError> {
+        if self.iteration.is_none() {
+            return Ok(None);
         }
-        self.rates = Some(rates.hand_over(()));
-        transition
+        let mut end = before.clone();
+        let cuts = self.stepper.statistics().cuts;
+        self.stepper.advance(t, h, &mut end)?;
+        if self.stepper.statistics().cuts > cuts {
+            return Err(OperatorError::Cut);
+        }
+        let within = Within::of(inside, &self.ground.table.view(), h);
+        if !self.iterate(t, h, &within) {
+            return Ok(None);
+        }
+        self.take_derivatives();
+        Ok(Some(end))
     }
 
     /// The adjoint of the step that the stepper has made, by iteration; false where it does not contract.

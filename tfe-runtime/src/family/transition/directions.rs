@@ -44,7 +44,7 @@ impl TransitionOperator {
     }
 
     /// Computes the derivatives along directions.
-    pub(super) fn answer<M: Model>(
+    pub(in crate::family) fn answer<M: Model>(
         &mut self,
         view: &View<'_, M>,
         rates: &Rates<&View<'_, M>>,

@@ -1,0 +1,294 @@
+//! Gradients and second derivatives across events that change the state or end the run: compared with those of the same
+//! model of fixed size, whose gradients are computed forwards, and with differences of runs.
+
+use crate::constrained::of_heap;
+use crate::differences::difference_over;
+use crate::events::{G, THREE, V, Y, apart, balls, by_momenta, fixed, long};
+use tfe::error::RunErrorKind;
+use tfe::length::{Length, RunTimeLength};
+use tfe::prelude::*;
+use tfe::sensitivity::Loss;
+use tfe::{Model, family};
+
+/// Actions are differentiated by differences over 2e-3, forwards along the derivatives and backwards along each
+/// component, with a rounding error of some 1e-13 / 2e-3, which each bounce multiplies several times.
+const SAME: f64 = 1e-9;
+
+/// A function of coordinates, momenta and velocities at the end.
+fn of_end<'l, const N: usize, L: Length<N>>() -> Loss<'l, N, L> {
+    Loss::of_end(|q, p, v| {
+        let last = q.len() - 1;
+        q[0].sin() + 0.5 * p[last] * p[last] + q[last] * v[0] + v[1] * v[1]
+    })
+}
+
+/// The same with outputs at the end and at times between bounces, and with an integral.
+fn of_speeds<'l, const N: usize, L: Length<N>>() -> Loss<'l, N, L> {
+    of_end()
+        .and(Loss::output_at_end("speed"))
+        .and(Loss::squares("speed", [0.31, 0.5, 0.77], [9.0, 8.5, 10.0]).times(0.1))
+        .and(Loss::integral("speed").times(0.7))
+}
+
+/// The same with the time at the end, and with integrals.
+fn of_clocks<'l, const N: usize, L: Length<N>>() -> Loss<'l, N, L> {
+    of_end()
+        .and(Loss::output_at_end("clock").times(2.0))
+        .and(Loss::integral("clock"))
+        .and(Loss::integral("speed"))
+}
+
+/// Compares losses and gradients, and returns the number of events.
+#[track_caller]
+fn check_same<M: family::Model, F: Model<N>, const N: usize>(
+    (long, fixed): (&Simulation<'_, M, 0, RunTimeLength>, &Simulation<'_, F, N>),
+    losses: (&family::Loss<'_>, &Loss<'_, N>),
+    (start, end): (&State<N>, f64),
+) -> usize {
+    let found = long.gradient(of_heap(start), 0.0..end, losses.0);
+    let expected = fixed.gradient(*start, 0.0..end, losses.1);
+    let (value, found) = found.expect("a gradient");
+    let (expected_value, expected) = expected.expect("a gradient");
+    assert!((value - expected_value).abs() <= 1e-11 * expected_value.abs().max(1.0));
+    assert_eq!(found.parameters(), expected.parameters());
+    let (own, other) = (found.motion().events(), expected.motion().events());
+    assert_eq!(own.len(), other.len());
+    let off = apart(found.by_parameters(), expected.by_parameters());
+    assert!(off <= SAME, "by parameters: {off:e}");
+    let (a, b) = (found.by_start(), expected.by_start());
+    for (a, b) in [(&a.q[..], &b.q[..]), (&a.p, &b.p)] {
+        let off = apart(a, b);
+        assert!(off <= SAME, "by the start: {off:e}, {a:?} {b:?}");
+    }
+    own.len()
+}
+
+#[test]
+fn gradients_go_through_impacts() {
+    let balls = balls(G);
+    let run = long(&balls).on("ground", Crossing::Falling, |event| {
+        Act::Restart(event.after_impact(0.8))
+    });
+    let beside = fixed().on("ground", Crossing::Falling, |event| {
+        Act::Restart(event.after_impact(0.8))
+    });
+    let start = THREE.state(Y, V);
+    let events = check_same((&run, &beside), (&of_speeds(), &of_speeds()), (&start, 1.0));
+    assert!(events > 1);
+    // Backwards in time, and with fewer nodes.
+    let (run, beside) = (run.record_every(7), beside.record_every(7));
+    let losses = (
+        &of_end().and(Loss::integral("clock")),
+        &of_end().and(Loss::integral("clock")),
+    );
+    check_same((&run, &beside), losses, (&start, -0.7));
+}
+
+/// Compared with differences of whole runs, as in `derivatives_across_events_are_those_of_runs`.
+#[test]
+fn gradients_across_events_are_differences_of_runs() {
+    const DISTANCE: f64 = 1e-3;
+    let start = balls(G).state(Y, V);
+    let bounce = |event: &tfe::Occurrence<'_, 0, RunTimeLength>| {
+        // A restitution that depends on a parameter, and a push that depends on the time.
+        let g = event.parameter("g").unwrap_or(f64::NAN);
+        let mut v = event.v.clone();
+        v[0] *= -0.08 * g;
+        v[1] += 0.3 * event.t;
+        Act::Restart(event.state_with_velocity(v))
+    };
+    let value = |g: f64, start: &family::FamilyState| {
+        let balls = balls(g);
+        let run = long(&balls).on("ground", Crossing::Falling, bounce);
+        let motion = run.run(start.clone(), 0.0..1.0).expect("a run");
+        let last = motion.last();
+        [last.q[0] * last.v[2] + last.p[1] + last.q[1] * last.q[1]]
+    };
+    let own = balls(G);
+    let run = long(&own).on("ground", Crossing::Falling, bounce);
+    let loss = family::Loss::of_end(|q, p, v| q[0] * v[2] + p[1] + q[1] * q[1]);
+    let found = run.gradient(start.clone(), 0.0..1.0, &loss);
+    let (_, found) = found.expect("a gradient");
+    assert!(found.motion().events().len() > 1);
+    let by_g = difference_over(DISTANCE, |g| value(g, &start), G);
+    let off = apart(&[found.by("g")], &by_g);
+    assert!(off <= 1e-8, "{off:e}: {} {by_g:?}", found.by("g"));
+    let by_start = found.by_start();
+    for a in 0..3 {
+        let moved = |by: &dyn Fn(&mut family::FamilyState)| {
+            let mut start = start.clone();
+            by(&mut start);
+            value(G, &start)
+        };
+        let by_q = difference_over(
+            DISTANCE,
+            |x| moved(&|start: &mut family::FamilyState| start.q[a] = x),
+            start.q[a],
+        );
+        let by_p = difference_over(
+            DISTANCE,
+            |x| moved(&|start: &mut family::FamilyState| start.p[a] = x),
+            start.p[a],
+        );
+        for (found, expected) in [(by_start.q[a], by_q), (by_start.p[a], by_p)] {
+            let off = apart(&[found], &expected);
+            assert!(off <= 1e-8, "{a}, {off:e}: {found} {expected:?}");
+        }
+    }
+}
+
+/// Impulses at events, and a run that ends at an event, whose time is that of the end.
+#[test]
+fn gradients_go_to_events_that_end_the_run() {
+    let balls = balls(G);
+    let run = long(&balls)
+        .on("ground", Crossing::Falling, |event| {
+            Act::Impulse(vec![-1.8 * event.p[0], 0.1 * event.v[1], 0.0])
+        })
+        .on_function(
+            "high",
+            Crossing::Falling,
+            |_, y, v| v[2] + 0.1 * y[0],
+            |event| match event.t > 0.5 {
+                true => Act::Stop,
+                false => Act::Record,
+            },
+        );
+    let beside = fixed()
+        .on("ground", Crossing::Falling, |event| {
+            Act::Impulse([-1.8 * event.p[0], 0.1 * event.v[1], 0.0])
+        })
+        .on_function(
+            "high",
+            Crossing::Falling,
+            |_, y, v| v[2] + 0.1 * y[0],
+            |event| match event.t > 0.5 {
+                true => Act::Stop,
+                false => Act::Record,
+            },
+        );
+    let start = THREE.state(Y, V);
+    let losses = (&of_clocks(), &of_clocks());
+    let events = check_same((&run, &beside), losses, (&start, 3.0));
+    assert!(events > 1);
+}
+
+/// Several events at one time: two with one zero, and one whose function jumps over zero by the action of the others.
+#[test]
+fn gradients_go_through_events_at_one_time() {
+    let balls = balls(G);
+    let run = long(&balls)
+        .on("ground", Crossing::Falling, |event| {
+            Act::Restart(event.after_impact(0.8))
+        })
+        .on_function(
+            "again",
+            Crossing::Falling,
+            |t, y, _| y[0] - 0.1 * t.sin(),
+            |event| Act::Impulse(vec![0.0, 0.1 * event.v[0], 0.05 * event.t]),
+        )
+        .on_function(
+            "turn",
+            Crossing::Rising,
+            |_, _, v| v[0],
+            |event| Act::Impulse(vec![0.1 * event.v[0], 0.0, 0.2 * event.q[1]]),
+        );
+    let beside = fixed()
+        .on("ground", Crossing::Falling, |event| {
+            Act::Restart(event.after_impact(0.8))
+        })
+        .on_function(
+            "again",
+            Crossing::Falling,
+            |t, y, _| y[0] - 0.1 * t.sin(),
+            |event| Act::Impulse([0.0, 0.1 * event.v[0], 0.05 * event.t]),
+        )
+        .on_function(
+            "turn",
+            Crossing::Rising,
+            |_, _, v| v[0],
+            |event| Act::Impulse([0.1 * event.v[0], 0.0, 0.2 * event.q[1]]),
+        );
+    let start = THREE.state(Y, V);
+    let motion = beside.run(start, 0.0..0.8).expect("a run");
+    let pairs = motion.events().windows(2);
+    assert!(pairs.filter(|two| two[0].t == two[1].t).count() > 1);
+    let losses = (
+        &of_end().and(Loss::integral("speed")),
+        &of_end().and(Loss::integral("speed")),
+    );
+    check_same((&run, &beside), losses, (&start, 0.8));
+}
+
+#[test]
+fn gradients_by_momenta_go_through_events() {
+    let (long, two, start) = by_momenta(0.4);
+    let run = Simulation::new(&long).element(Mixed::<6>).step(0.1);
+    let run = run.on("fast", Crossing::Rising, |event| {
+        Act::Restart(family::FamilyState {
+            q: event.q.clone(),
+            p: vec![-event.p[0], event.p[1] * event.q[0]],
+        })
+    });
+    let beside = Simulation::new(&two).element(Mixed::<6>).step(0.1);
+    let beside = beside.on("fast", Crossing::Rising, |event| {
+        Act::Restart(tfe::runtime::State {
+            q: event.q,
+            p: [-event.p[0], event.p[1] * event.q[0]],
+        })
+    });
+    let events = check_same((&run, &beside), (&of_end(), &of_end()), (&start, 4.0));
+    assert!(events > 1);
+    // An event that an impulse causes has the time of the impulse, which does not change.
+    let (long, two, start) = by_momenta(3.0);
+    let run = Simulation::new(&long).element(Mixed::<6>).step(0.1);
+    let run = run.impulse(0.8, [4.0, 0.5]);
+    let run = run.on("fast", Crossing::Rising, |event| {
+        Act::Impulse(vec![-event.p[0], event.q[0]])
+    });
+    let beside = Simulation::new(&two).element(Mixed::<6>).step(0.1);
+    let beside = beside.impulse(0.8, [4.0, 0.5]);
+    let beside = beside.on("fast", Crossing::Rising, |event| {
+        Act::Impulse([-event.p[0], event.q[0]])
+    });
+    let events = check_same((&run, &beside), (&of_end(), &of_end()), (&start, 2.0));
+    assert_eq!(events, 1);
+}
+
+/// Second derivatives are differences over 4e-3 of gradients, whose errors of 1e-12 enter with the inverse of that.
+#[test]
+fn second_derivatives_go_through_impacts() {
+    let balls = balls(G);
+    let run = long(&balls).on("ground", Crossing::Falling, |event| {
+        Act::Restart(event.after_impact(0.8))
+    });
+    let beside = fixed().on("ground", Crossing::Falling, |event| {
+        Act::Restart(event.after_impact(0.8))
+    });
+    let start = THREE.state(Y, V);
+    let names = ["g", "k", "a"];
+    let found = run.hessian(of_heap(&start), 0.0..0.6, &of_end(), names);
+    let expected = beside.hessian(start, 0.0..0.6, &of_end(), names);
+    let (found, expected) = (found.expect("a matrix"), expected.expect("a matrix"));
+    assert!(!found.gradient().motion().events().is_empty());
+    let off = apart(found.matrix(), expected.matrix());
+    assert!(
+        off <= 1e-7,
+        "{off:e}: {} {}",
+        found.matrix(),
+        expected.matrix()
+    );
+}
+
+#[test]
+fn gradients_refuse_parameters_that_are_set() {
+    let balls = balls(G);
+    let run = long(&balls).on("ground", Crossing::Falling, |_| {
+        Act::Set(Settings::new("k", 20.0))
+    });
+    let start = balls.state([0.1, 1.2, 2.0], [3.0, 2.0, 3.5]);
+    let error = run.gradient(start, 0.0..1.0, &of_end());
+    let error = error.expect_err("derivatives by what is set");
+    let call = "gradient";
+    assert_eq!(error.kind(), &RunErrorKind::SetUnsupported { call });
+}
