@@ -8,20 +8,76 @@ use tfe_runtime::Form;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::family::{Block, Entries, Gradient, Model};
 
-/// The mass matrix ∂²L/∂v², bordered by the rows of the constraints.
+/// Collects the entries of the mass matrix ∂²L/∂v², and of the rows of constraints that border it.
 struct Mass {
-    matrix: DMatrix<f64>,
+    entries: Vec<(usize, usize, f64)>,
     n: usize,
 }
 
 impl Entries<f64> for Mass {
     fn add(&mut self, block: Block, row: usize, column: usize, value: f64) {
         if block == Block::Row {
-            self.matrix[(self.n + row, column)] += value;
-            self.matrix[(column, self.n + row)] += value;
+            self.entries.push((self.n + row, column, value));
+            self.entries.push((column, self.n + row, value));
         } else {
-            self.matrix[(row, column)] += value;
+            self.entries.push((row, column, value));
         }
+    }
+}
+
+/// A factorised matrix.
+enum Factors {
+    /// The diagonal of a matrix that has no other entries.
+    Diagonal(Vec<f64>),
+    Full(LU<f64, Dyn, Dyn>),
+}
+
+impl Factors {
+    /// Those of a square matrix with `size` rows.
+    fn of(entries: &[(usize, usize, f64)], size: usize) -> Self {
+        if entries.iter().all(|(row, column, _)| row == column) {
+            let mut diagonal = vec![0.0; size];
+            for (row, _, value) in entries {
+                diagonal[*row] += value;
+            }
+            return Self::Diagonal(diagonal);
+        }
+        let mut matrix = DMatrix::zeros(size, size);
+        for (row, column, value) in entries {
+            matrix[(*row, *column)] += value;
+        }
+        Self::Full(matrix.lu())
+    }
+
+    /// The solution; `None` if the matrix is singular.
+    fn solve(&self, right: Vec<f64>) -> Option<Vec<f64>> {
+        match self {
+            Self::Full(factors) => {
+                let found = factors.solve(&DVector::from_vec(right))?;
+                Some(found.as_slice().to_vec())
+            }
+            Self::Diagonal(diagonal) => {
+                let pairs = right.iter().zip(diagonal);
+                let found = pairs.map(|(right, entry)| (*entry != 0.0).then(|| right / entry));
+                found.collect()
+            }
+        }
+    }
+
+    /// Whether velocities are determined without constraints. Pivots are compared with their columns, whose units are
+    /// those of coordinates, and with the terms subtracted in the elimination, since rows have these units, too.
+    fn is_regular(&self) -> bool {
+        const SINGULAR: f64 = 1e-10;
+        let factors = match self {
+            Self::Diagonal(diagonal) => return diagonal.iter().all(|entry| entry.abs() > 0.0),
+            Self::Full(factors) => factors,
+        };
+        let (l, u) = (factors.l(), factors.u());
+        (0..u.ncols()).all(|a| {
+            let pivot = u[(a, a)].abs();
+            let subtracted = || -> f64 { (0..a).map(|k| (l[(a, k)] * u[(k, a)]).abs()).sum() };
+            pivot > SINGULAR * u.column(a).amax() || pivot > SINGULAR * subtracted()
+        })
     }
 }
 
@@ -46,7 +102,7 @@ pub(crate) struct Along<'a, M> {
     node: &'a Node<0, RunTimeLength>,
     /// The factors of L_vv of a Lagrangian; if that is singular and there are constraints, those of the matrix of
     /// (T-74).
-    factors: Option<LU<f64, Dyn, Dyn>>,
+    factors: Option<Factors>,
     /// The multipliers η of this matrix, with p = L_v + Aᵀη; `None` for L_vv alone.
     eta: Option<Vec<f64>>,
 }
@@ -63,35 +119,34 @@ impl<'a, M: Model> Along<'a, M> {
             return along;
         }
         let factors = along.factored(0);
-        let is_regular = model.constraints() == 0 || is_regular(&factors);
+        let is_regular = model.constraints() == 0 || factors.is_regular();
         along.factors = Some(factors);
         if !is_regular {
             let n = model.len();
             let factors = along.factored(model.constraints());
             let still = |values: &[f64]| duals(values, &vec![0.0; n]);
             let slope = along.first(Dual::new(node.t, 0.0), &still(&node.q), &still(&node.v));
-            let right = DVector::from_fn(n + model.constraints(), |a, _| {
-                let own = slope.get(a).zip(node.p.get(a));
-                own.map_or(0.0, |(slope, p)| p - slope.value)
-            });
-            let found = factors.solve(&right);
-            along.eta = found.map(|found| found.as_slice()[n..].to_vec());
+            let pairs = slope.iter().zip(&node.p);
+            let mut right: Vec<f64> = pairs.map(|(slope, p)| p - slope.value).collect();
+            right.resize(n + model.constraints(), 0.0);
+            let found = factors.solve(right);
+            along.eta = found.map(|found| found[n..].to_vec());
             along.factors = Some(factors);
         }
         along
     }
 
     /// Factorises L_vv, bordered by a number of rows of constraints.
-    fn factored(&self, rows: usize) -> LU<f64, Dyn, Dyn> {
+    fn factored(&self, rows: usize) -> Factors {
         let (model, node) = (self.model, self.node);
         let n = model.len();
-        let matrix = DMatrix::zeros(n + rows, n + rows);
-        let mut mass = Mass { matrix, n };
+        let entries = Vec::new();
+        let mut mass = Mass { entries, n };
         model.mass(node.t, &node.q, &node.v, &mut mass);
         if rows > 0 {
             model.constraint_rows(node.t, &node.q, &mut vec![0.0; rows], &mut mass);
         }
-        mass.matrix.lu()
+        Factors::of(&mass.entries, n + rows)
     }
 
     /// δv; NaN if the mass matrix is singular.
@@ -110,8 +165,8 @@ impl<'a, M: Model> Along<'a, M> {
         if let Some(eta) = &self.eta {
             self.add_held(time, &q, eta, &mut right);
         }
-        let found = factors.solve(&DVector::from_vec(right));
-        found.map_or_else(|| vec![f64::NAN; n], |found| found.as_slice()[..n].to_vec())
+        let found = factors.solve(right);
+        found.map_or_else(|| vec![f64::NAN; n], |found| found[..n].to_vec())
     }
 
     /// Subtracts the derivatives of Aᵀη from the entries of `right`, and appends those of −(A v + a), at constant
@@ -152,18 +207,6 @@ impl<'a, M: Model> Along<'a, M> {
     }
 }
 
-/// Whether the velocities are determined without constraints. Pivots are compared with their columns, whose units are
-/// those of coordinates, and with the terms subtracted in the elimination, since rows have these units, too.
-fn is_regular(factors: &LU<f64, Dyn, Dyn>) -> bool {
-    const SINGULAR: f64 = 1e-10;
-    let (l, u) = (factors.l(), factors.u());
-    (0..u.ncols()).all(|a| {
-        let pivot = u[(a, a)].abs();
-        let subtracted = || -> f64 { (0..a).map(|k| (l[(a, k)] * u[(k, a)]).abs()).sum() };
-        pivot > SINGULAR * u.column(a).amax() || pivot > SINGULAR * subtracted()
-    })
-}
-
 fn duals(values: &[f64], slopes: &[f64]) -> Vec<Dual> {
     let pairs = values.iter().zip(slopes);
     pairs
@@ -177,7 +220,14 @@ mod tests {
 
     #[test]
     fn masses_are_regular_in_any_units() {
-        let regular = |entries: [f64; 4]| is_regular(&DMatrix::from_row_slice(2, 2, &entries).lu());
+        let regular = |entries: [f64; 4]| {
+            let places = [(0, 0), (0, 1), (1, 0), (1, 1)];
+            let entries = places.iter().zip(entries);
+            let entries: Vec<_> = entries
+                .map(|((row, column), x)| (*row, *column, x))
+                .collect();
+            Factors::of(&entries, 2).is_regular()
+        };
         for length in [1.0, 1e-6, 1e-11, 1e-14, 1e-20, 1e11] {
             // A body of mass one with a pendulum of mass one half; and the pendulum alone, whose bob and angle move in
             // the same way.
@@ -186,5 +236,19 @@ mod tests {
             assert!(regular([square, turned, turned, 1.5]), "{length}");
             assert!(!regular([0.5, turned, turned, square]), "{length}");
         }
+    }
+
+    /// A diagonal matrix needs no elimination, however many masses there are.
+    #[test]
+    fn diagonal_masses_are_divisors() {
+        let diagonal: Vec<_> = (0..4).map(|a| (a, a, 1.0 + a as f64)).collect();
+        let mut twice = diagonal.clone();
+        twice.push((3, 3, 1.0));
+        let factors = Factors::of(&twice, 4);
+        assert!(matches!(factors, Factors::Diagonal(_)) && factors.is_regular());
+        let found = factors.solve(vec![1.0, 1.0, 6.0, 10.0]);
+        assert_eq!(found, Some(vec![1.0, 0.5, 2.0, 2.0]));
+        let singular = Factors::of(&diagonal[..3], 4);
+        assert!(singular.solve(vec![1.0; 4]).is_none() && !singular.is_regular());
     }
 }
