@@ -3,14 +3,14 @@
 use super::error::OrbitError;
 use super::orbit::{Verdict, sort, trivial_of};
 use super::phase::Period;
-use super::problem::force_at;
 use super::rest::{Extent, is_at_rest};
 use super::setup::PeriodicOrbit;
 use crate::assembly::MeshError;
 use crate::linearised::Linearised;
-use crate::motion::{Motion, Setting};
+use crate::motion::{Motion, Node, Setting};
 use crate::numbers::{larger, largest, raise};
 use crate::periodic_schur::Multiplier;
+use crate::sensitivity::varied::Varied;
 use crate::simulation::Simulation;
 use nalgebra::{Complex, DMatrix, DVector};
 use tfe_runtime::{Model, State};
@@ -186,9 +186,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
             iterations += 1;
             let scales = scales(run.motion());
             let residual = self.residual(&run, &scales);
-            let last_node = run.motion().last();
-            let model = self.simulation.model();
-            let rate = rate(model, last_node.t, &last_node.state(), &last_node.v);
+            let rate = rate(self.simulation.model(), run.motion().last());
             let closing = Closing {
                 product: run.product(),
                 rate: is_free.then_some(rate),
@@ -461,17 +459,10 @@ fn left_over<'s, M: Model<N>, const N: usize>(
 }
 
 /// The flow ẏ = (ṗ, q̇).
-fn rate<M: Model<N>, const N: usize>(
-    model: &M,
-    t: f64,
-    state: &State<N>,
-    v: &[f64; N],
-) -> DVector<f64> {
-    let force = force_at(model, t, state, v);
-    DVector::from_fn(2 * N, |row, _| match row.checked_sub(N) {
-        None => force[row],
-        Some(a) => v[a],
-    })
+fn rate<M: Model<N>, const N: usize>(model: &M, node: &Node<N>) -> DVector<f64> {
+    let push = model.push(node);
+    let both = push.iter().chain(&node.v);
+    DVector::from_iterator(2 * N, both.copied())
 }
 
 /// A periodic orbit with events, and its Floquet multipliers; made by [`HybridOrbits::solve`].

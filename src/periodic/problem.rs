@@ -3,7 +3,9 @@
 use super::error::OrbitError;
 use super::phase::Phase;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem, Solution};
+use crate::motion::Node;
 use crate::numbers::norm;
+use crate::sensitivity::varied::Varied;
 use tfe_runtime::condenser::Direction;
 use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::{
@@ -180,22 +182,6 @@ fn orthogonal_to_flow<const N: usize>(advance: &[f64; N], nodes: &[State<N>], we
     weights[last * 2 * N..].fill(0.0);
 }
 
-/// The rate ṗ of the momenta without reactions of constraints: L_q + Q.
-pub(super) fn force_at<M: Model<N>, const N: usize>(
-    model: &M,
-    t: f64,
-    state: &State<N>,
-    v: &[f64; N],
-) -> [f64; N] {
-    let (z, sign) = match M::FORM {
-        Form::Lagrangian => (v, 1.0),
-        Form::Hamiltonian => (&state.p, -1.0),
-    };
-    let mut first = First::ZERO;
-    model.first(t, &state.q, z, &mut first);
-    std::array::from_fn(|a| sign * first.q[a] + first.force[a])
-}
-
 /// The flow ẏ = (ṗ, q̇) at a state, from the equations of motion, in the order (p, q); `None` if no velocity belongs to
 /// the momentum, or there are no reactions.
 fn flow_at<M: Model<N>, const N: usize>(
@@ -204,19 +190,11 @@ fn flow_at<M: Model<N>, const N: usize>(
     state: &State<N>,
 ) -> Option<[[f64; N]; 2]> {
     let v = velocity_of(model, t, state).ok()?;
-    let mut force = force_at(model, t, state, &v);
-    if const { !M::CONSTRAINTS.is_empty() } {
-        let reactions = constrained::reactions(model, t, state, &v).ok()?;
-        let mut rows = vec![[0.0; N]; reactions.len()];
-        let mut drift = vec![0.0; reactions.len()];
-        model.constraint_rows(t, &state.q, &mut rows, &mut drift);
-        for (row, reaction) in rows.iter().zip(&reactions) {
-            for a in 0..N {
-                force[a] += row[a] * reaction;
-            }
-        }
-    }
-    Some([force, v])
+    let node: Node<N> = Node::of(t, state, v);
+    let push = model.push(&node);
+    push.iter()
+        .all(|push| push.is_finite())
+        .then_some([push, v])
 }
 
 /// The velocity of a momentum; if the kinetic energy does not determine it, the one that the constraints determine.

@@ -20,7 +20,8 @@ pub(crate) trait Varied<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// The derivatives of the velocities at a node; NaN if the mass matrix is singular.
     fn velocity_along<'a>(&'a self, node: &'a Node<N, L>) -> Velocity<'a, N, L>;
 
-    /// dp/dt at a node of a model without constraints: L_q + Q of a Lagrangian, Q − H_q of a Hamiltonian.
+    /// dp/dt at a node: L_q + Q of a Lagrangian, Q − H_q of a Hamiltonian, and the reactions Aᵀλ of constraints; NaN if
+    /// there are none.
     fn push(&self, node: &Node<N, L>) -> L::Vector;
 }
 
@@ -47,7 +48,20 @@ impl<M: Model<N>, const N: usize> Varied<N, FixedLength> for M {
         let mut first = First::ZERO;
         self.first(node.t, &node.q, z, &mut first);
         let sign = sign(M::FORM);
-        std::array::from_fn(|a| sign * first.q[a] + first.force[a])
+        let mut push: [f64; N] = std::array::from_fn(|a| sign * first.q[a] + first.force[a]);
+        if const { !M::CONSTRAINTS.is_empty() } {
+            let at = (&node.q, &node.p);
+            let reactions = Evaluate::<N, FixedLength>::reactions(self, node.t, at, &node.v);
+            let mut rows = vec![[0.0; N]; reactions.len()];
+            let mut drift = vec![0.0; reactions.len()];
+            self.constraint_rows(node.t, &node.q, &mut rows, &mut drift);
+            for (row, reaction) in rows.iter().zip(&reactions) {
+                for (push, entry) in push.iter_mut().zip(row) {
+                    *push += entry * reaction;
+                }
+            }
+        }
+        push
     }
 }
 
@@ -77,6 +91,31 @@ impl<M: family::Model> Varied<0, RunTimeLength> for M {
         let sign = sign(M::FORM);
         let both = by_q.iter().zip(&force);
         // Models without forces leave `force` at zero.
-        both.map(|(by_q, force)| sign * by_q + force).collect()
+        let mut push: Vec<f64> = both.map(|(by_q, force)| sign * by_q + force).collect();
+        if M::CONSTRAINED {
+            let at = (&node.q, &node.p);
+            let lambda = Evaluate::<0, RunTimeLength>::reactions(self, node.t, at, &node.v);
+            let mut drift = vec![0.0; lambda.len()];
+            let mut reactions = Reactions {
+                lambda: &lambda,
+                forces: &mut push,
+            };
+            self.constraint_rows(node.t, &node.q, &mut drift, &mut reactions);
+        }
+        push
+    }
+}
+
+/// Adds the reactions Aᵀλ to forces.
+#[cfg(feature = "sparse")]
+struct Reactions<'a> {
+    lambda: &'a [f64],
+    forces: &'a mut [f64],
+}
+
+#[cfg(feature = "sparse")]
+impl family::Entries<f64> for Reactions<'_> {
+    fn add(&mut self, _: family::Block, row: usize, column: usize, value: f64) {
+        self.forces[column] += value * self.lambda[row];
     }
 }

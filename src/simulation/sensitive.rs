@@ -292,9 +292,6 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             return Ok((reached, Some(inside)));
         }
         // The start of the element.
-        if const { !M::CONSTRAINTS.is_empty() } {
-            return Err(TransitionError::NoStep);
-        }
         Ok((self.carried.at_start(&*self.model, severed.event), None))
     }
 }

@@ -341,3 +341,78 @@ fn losses_of_small_numbers_have_their_gradients() {
         assert!((far + 1.0).abs() < 1e-8, "{size:e}: {far}");
     }
 }
+
+/// Two events at one time: the second is at the start of an element. A pendulum by its place, whose reaction determines
+/// how the motion goes on from there, is one by its angle.
+#[test]
+fn derivatives_with_constraints_go_through_events_at_one_time() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+        constraint(rod) = x^2 + y^2 - 1,
+    )]
+    struct Rod {
+        m: f64,
+        g: f64,
+    }
+    #[dynamics(coordinates(a), lagrangian = m/2*dot(a)^2 + m*g*cos(a))]
+    struct Angle {
+        m: f64,
+        g: f64,
+    }
+    let (m, g) = (1.3, 9.81);
+    let (rod, angle) = (Rod { m, g }, Angle { m, g });
+    // The wall, and at once a push along the circle that depends on the velocity.
+    let run = Simulation::new(&rod).element(Mixed::<7>).step(0.02);
+    let run = run
+        .on_function(
+            "wall",
+            Crossing::Falling,
+            |_, q, _| 0.3 - q[0],
+            |event| Act::Restart(event.after_impact(0.8)),
+        )
+        .on_function(
+            "again",
+            Crossing::Falling,
+            |_, q, _| 0.3 - q[0],
+            |event| {
+                let ([x, y], v) = (event.q, event.v);
+                let push = 0.1 * (x * v[1] - y * v[0]);
+                Act::Impulse([-y * push, x * push])
+            },
+        );
+    let beside = Simulation::new(&angle).element(Mixed::<7>).step(0.02);
+    let beside = beside
+        .on_function(
+            "wall",
+            Crossing::Falling,
+            |_, a, _| 0.3 - a[0].sin(),
+            |event| Act::Restart(event.after_impact(0.8)),
+        )
+        .on_function(
+            "again",
+            Crossing::Falling,
+            |_, a, _| 0.3 - a[0].sin(),
+            |event| Act::Impulse([0.1 * event.v[0]]),
+        );
+    let found = run.run_sensitive(rod.state([0.0, -1.0], [1.5, 0.0]), 0.0..0.7);
+    let found = found.expect("derivatives");
+    let expected = beside.run_sensitive(angle.state([0.0], [1.5]), 0.0..0.7);
+    let expected = expected.expect("derivatives");
+    let times = |s: &Motion<2>| -> Vec<f64> { s.events().iter().map(|event| event.t).collect() };
+    let times = times(found.motion());
+    assert!(times.len() == 2 && times[0] == times[1], "{times:?}");
+    let (sin, cos) = expected.motion().last().q[0].sin_cos();
+    for name in ["m", "g"] {
+        let (by, other) = (found.by(name), expected.by(name));
+        let turn = other.last().q[0];
+        let off = [by.last().q[0] - cos * turn, by.last().q[1] - sin * turn];
+        let off = off.map(f64::abs);
+        assert!(off[0] <= 1e-9 && off[1] <= 1e-9, "{name}: {off:?}");
+        for event in 0..2 {
+            let (dt, expected) = (by.event_time(event), other.event_time(event));
+            let (dt, expected) = (dt.expect("an event"), expected.expect("an event"));
+            assert!((dt - expected).abs() <= 1e-10, "{name}: {dt} {expected}");
+        }
+    }
+}

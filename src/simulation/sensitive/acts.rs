@@ -256,7 +256,7 @@ where
     fn motion(&self, column: usize) -> Option<Way<N, L>> {
         let (q, p) = self.jump.scales();
         let change = Change::<N, L>::of_column(&self.jump.severed.event.q, self.at, column);
-        let size = (largest(change.q.as_ref()) / q).max(largest(change.p.as_ref()) / p);
+        let size = larger(largest(change.q.as_ref()) / q, largest(change.p.as_ref()) / p);
         let time = self.times[column];
         (size != 0.0 || time != 0.0).then(|| Way {
             change,
