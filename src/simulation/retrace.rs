@@ -2,7 +2,7 @@
 
 use super::sensitive::carried::{END, START};
 use super::setup::Simulation;
-use super::trail::{Between, Element, LONG_STEPS, Trail};
+use super::trail::{Between, Element, Kicked, LONG_STEPS, Trail};
 use crate::error::RunErrorKind;
 use crate::length::RunTimeLength;
 use tfe_runtime::family::{self, OperatorError, TransitionOperator};
@@ -20,7 +20,10 @@ pub(super) trait Retrace<'m, M> {
         transition: &TransitionOperator,
     ) -> Result<(), OperatorError>;
 
-    /// Processes a record between elements; `model` has the parameters that were set before.
+    /// Processes the impulses at the start of the next element.
+    fn kicked(&mut self, model: &M, kicked: &Kicked) -> Result<(), OperatorError>;
+
+    /// Processes another record between elements; `model` has the parameters that were set before.
     fn between(&mut self, model: &M, between: &Between<'m, M>) -> Result<(), RunErrorKind>;
 }
 
@@ -55,7 +58,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 if let Between::Set(other) = one {
                     model = other.clone();
                 }
-                follower.between(&*model, one)?;
+                tell(follower, &*model, one, (elements.get(passed), call))?;
             }
             if passed == elements.len() {
                 return Ok(());
@@ -78,7 +81,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                     return Ok(());
                 }
                 while let Some((_, one)) = between.next_if(|(at, _)| *at == passed) {
-                    if let Err(kind) = follower.between(&*model, one) {
+                    let next = elements.get(passed);
+                    if let Err(kind) = tell(follower, &*model, one, (next, call)) {
                         refusal = Some(kind);
                         return Err(OperatorError::Cut);
                     }
@@ -93,6 +97,22 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 );
             }
         }
+    }
+}
+
+/// Passes a record to a follower, given the element that follows, if there is one.
+fn tell<'m, M>(
+    follower: &mut dyn Retrace<'m, M>,
+    model: &M,
+    record: &Between<'m, M>,
+    (next, call): (Option<&Element>, &'static str),
+) -> Result<(), RunErrorKind> {
+    match record {
+        Between::Kicked(kicked) => {
+            let done = follower.kicked(model, kicked);
+            done.map_err(|error| operator_failed(error, next, call))
+        }
+        _ => follower.between(model, record),
     }
 }
 

@@ -33,28 +33,20 @@ pub(super) struct Element {
     after: FamilyState,
     /// Whether an event precedes the element, and whether one ends it, so that its start or its end moves in time.
     pub(super) moves: (bool, bool),
-    /// The impulse at its start, for a model with constraints.
-    pub(super) kicked: Option<Kicked>,
 }
 
-/// The states around an impulse on a model with constraints, which react to a part of it at once.
+/// The states around impulses on a model with constraints, which react to a part of them at once.
 #[cfg_attr(not(feature = "sparse"), expect(dead_code))]
 pub(super) struct Kicked {
-    /// The state before the impulse.
+    /// The start of the element at which they act, as solved.
+    pub(super) t: f64,
+    /// The state before them.
     pub(super) before: FamilyState,
-    /// The state with the whole impulse added to its momentum.
+    /// The state with the whole impulses added to its momentum.
     pub(super) with: FamilyState,
 }
 
 impl Element {
-    /// The state of the node at which the element begins, before impulses.
-    #[cfg(feature = "sparse")]
-    pub(super) fn node(&self) -> &FamilyState {
-        self.kicked
-            .as_ref()
-            .map_or(&self.before, |kicked| &kicked.before)
-    }
-
     /// Checks that the element, solved again, ends where it did, within the tolerance of the iteration.
     #[cfg(feature = "sparse")]
     pub(super) fn check<M: family::Model>(
@@ -187,6 +179,8 @@ impl<'m> Cut<'m> {
 pub(super) enum Between<'m, M> {
     /// A recorded node, by its index in [`Motion::states`].
     Node(usize),
+    /// Impulses at the start of the next element.
+    Kicked(Box<Kicked>),
     /// An event that cut the element before it, or that fell on the start of the next element.
     Cut(Box<Cut<'m>>),
     /// The action at that event has been performed.
@@ -203,10 +197,6 @@ pub(super) struct Trail<'m, M> {
     keeps_nodes: bool,
     /// The number of nodes so far.
     nodes: usize,
-    /// Whether events that end elements are recorded; otherwise they are refused.
-    takes_cuts: bool,
-    /// Whether an event has ended an element.
-    is_cut: bool,
     /// The number of elements of the grid so far.
     reached: usize,
     /// Whether an event precedes the next element.
@@ -225,8 +215,6 @@ impl<'m, M: family::Model> Trail<'m, M> {
             between: Vec::new(),
             keeps_nodes: false,
             nodes: 0,
-            takes_cuts: false,
-            is_cut: false,
             reached: 0,
             is_moved: false,
             ends_moved: false,
@@ -235,19 +223,11 @@ impl<'m, M: family::Model> Trail<'m, M> {
         }
     }
 
-    /// A trail that continues over events that end elements; for models with constraints, these are still refused.
-    pub(super) fn over_events() -> Self {
-        Self {
-            takes_cuts: !M::CONSTRAINED,
-            ..Self::new()
-        }
-    }
-
-    /// The same, for a trail that tells where the recorded nodes are.
+    /// A trail that tells where the recorded nodes are.
     pub(super) fn with_nodes() -> Self {
         Self {
             keeps_nodes: true,
-            ..Self::over_events()
+            ..Self::new()
         }
     }
 
@@ -272,29 +252,27 @@ impl<'m, M: family::Model> Trail<'m, M> {
         self.between.push((self.elements.len(), between));
     }
 
-    /// The states around the impulses at the start of an element, if there are any.
-    fn kicked(&mut self, passed: &Passed<'_, 0, RunTimeLength>) -> Option<Kicked> {
-        let before = std::mem::replace(&mut self.last, passed.after.clone());
-        let mut with = before.clone();
-        let at = (passed.start, passed.h);
-        acting::kick(&self.impulses, at, &mut with.p).then_some(Kicked { before, with })
+    /// Records the impulses at the start of an element of the grid that is solved from time `t` on, if there are any.
+    fn add_kick(&mut self, element: (f64, f64), t: f64) {
+        // Behind an event there are none.
+        if self.is_moved || !self.reacts() {
+            return;
+        }
+        let mut with = self.last.clone();
+        if acting::kick(&self.impulses, element, &mut with.p) {
+            let before = self.last.clone();
+            self.add(Between::Kicked(Box::new(Kicked { t, before, with })));
+        }
+    }
+
+    /// Whether there are constraints that react to impulses.
+    fn reacts(&self) -> bool {
+        M::CONSTRAINED && !self.impulses.is_empty()
     }
 
     /// The error of a call for derivatives of this motion, if its elements cannot be solved again in the same way.
-    fn refusal(
-        &self,
-        motion: &Motion<0, RunTimeLength>,
-        call: &'static str,
-    ) -> Option<RunErrorKind> {
-        let is_cut = self.is_cut || motion.arcs().count() > 1;
-        let of = if is_cut && !self.takes_cuts {
-            match M::CONSTRAINED {
-                true => {
-                    "models of run-time length with constraints whose events change the state or end the run"
-                }
-                false => "models of run-time length whose events change the state or end the run",
-            }
-        } else if motion.statistics().cuts > 0 {
+    fn refusal(motion: &Motion<0, RunTimeLength>, call: &'static str) -> Option<RunErrorKind> {
+        let of = if motion.statistics().cuts > 0 {
             LONG_STEPS
         } else if motion.statistics().kinks > 0 {
             "models of run-time length whose steps are cut at kinks"
@@ -330,7 +308,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             trail.last.clone_from(&start);
         }
         let motion = self.drive(start, span, identity, Some(&mut trail))?;
-        match trail.refusal(&motion, call) {
+        match Trail::<M>::refusal(&motion, call) {
             Some(kind) => Err(RunError::new(kind, motion)),
             None => Ok((motion, trail)),
         }
@@ -343,11 +321,12 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M>
         _: &mut family::Stepper<'m, M>,
         passed: &Passed<'_, 0, RunTimeLength>,
     ) -> Result<(), TransitionError> {
-        let kicked = match M::CONSTRAINED && !self.impulses.is_empty() {
-            true => self.kicked(passed),
-            false => None,
-        };
-        self.check_kick((passed.start, passed.h), passed.before)?;
+        let at = (passed.start, passed.h);
+        self.check_kick(at, passed.before)?;
+        self.add_kick(at, passed.begin);
+        if self.reacts() {
+            self.last.clone_from(passed.after);
+        }
         self.elements.push(Element {
             number: self.reached,
             t: passed.begin,
@@ -356,18 +335,15 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M>
             before: passed.before.clone(),
             after: passed.after.clone(),
             moves: (self.is_moved, false),
-            kicked,
         });
         self.is_moved = false;
         Ok(())
     }
 
     fn cut(&mut self, severed: &Severed<'_, 'm, 0, RunTimeLength>) -> Result<(), TransitionError> {
-        self.is_cut = true;
-        if !self.takes_cuts {
-            return Ok(());
-        }
-        self.check_kick((severed.start, severed.step), severed.before)?;
+        let at = (severed.start, severed.step);
+        self.check_kick(at, severed.before)?;
+        self.add_kick(at, severed.begin);
         if severed.inside {
             self.elements.push(Element {
                 number: self.reached,
@@ -377,7 +353,6 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M>
                 before: severed.before.clone(),
                 after: severed.event.state(),
                 moves: (self.is_moved, true),
-                kicked: None,
             });
         }
         self.is_moved = true;
@@ -386,15 +361,11 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M>
     }
 
     fn acted(&mut self) {
-        if self.takes_cuts {
-            self.add(Between::Acted);
-        }
+        self.add(Between::Acted);
     }
 
     fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
-        if self.takes_cuts {
-            self.add(Between::Set(model.clone()));
-        }
+        self.add(Between::Set(model.clone()));
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! Derivatives across events that change the state or end the run: compared with those of the same model of fixed size,
 //! and with differences of runs.
 
-use crate::constrained::{of_heap, rods, start};
+use crate::constrained::of_heap;
 use crate::differences::difference_over;
 use crate::largest::larger;
 use tfe::error::RunErrorKind;
@@ -133,10 +133,10 @@ pub(super) fn apart<'a>(
 
 /// Both are derivatives of the same computed motion. Actions are differentiated by differences over 2e-3, with a
 /// rounding error of some 1e-13 / 2e-3, which each bounce multiplies several times.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
 
 #[track_caller]
-fn check_same<const N: usize>(
+pub(super) fn check_same<const N: usize>(
     long: &Sensitive<0, RunTimeLength>,
     fixed: &Sensitive<N>,
     times: &[f64],
@@ -437,24 +437,4 @@ fn derivatives_go_through_events_of_impulses() {
         &expected.expect("derivatives"),
         &[0.37, 0.79, 0.83, 1.9],
     );
-}
-
-#[test]
-fn events_of_models_with_constraints_are_refused() {
-    let (long, fixed) = rods();
-    let begin = of_heap(&start(&fixed));
-    let run = Simulation::new(&long).element(Mixed::<4>).step(0.05);
-    let run = run.on_function("late", Crossing::Rising, |t, _, _| t - 0.12, |_| Act::Stop);
-    let told = |error: family::RunError| match error.kind() {
-        RunErrorKind::Unsupported { call, of } => format!("{call} {of}"),
-        other => panic!("{other}"),
-    };
-    let error = run.run_sensitive(begin.clone(), 0.0..0.3);
-    let texts = [
-        told(error.expect_err("an event that ends the run")),
-        told(run.run_linearised(begin, 0.0..0.3).expect_err("the same")),
-    ];
-    for text in texts {
-        assert!(text.contains("with constraints whose events"), "{text}");
-    }
 }

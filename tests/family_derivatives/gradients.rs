@@ -3,16 +3,12 @@
 
 use crate::constrained::of_heap;
 use crate::differences::difference_over;
-use crate::events::{G, THREE, V, Y, apart, balls, by_momenta, fixed, long};
+use crate::events::{G, SAME, THREE, V, Y, apart, balls, by_momenta, fixed, long};
 use tfe::error::RunErrorKind;
 use tfe::length::{Length, RunTimeLength};
 use tfe::prelude::*;
 use tfe::sensitivity::Loss;
 use tfe::{Model, family};
-
-/// Actions are differentiated by differences over 2e-3, forwards along the derivatives and backwards along each
-/// component, with a rounding error of some 1e-13 / 2e-3, which each bounce multiplies several times.
-const SAME: f64 = 1e-9;
 
 /// A function of coordinates, momenta and velocities at the end.
 fn of_end<'l, const N: usize, L: Length<N>>() -> Loss<'l, N, L> {
@@ -40,7 +36,7 @@ fn of_clocks<'l, const N: usize, L: Length<N>>() -> Loss<'l, N, L> {
 
 /// Compares losses and gradients, and returns the number of events.
 #[track_caller]
-fn check_same<M: family::Model, F: Model<N>, const N: usize>(
+pub(super) fn check_same<M: family::Model, F: Model<N>, const N: usize>(
     (long, fixed): (&Simulation<'_, M, 0, RunTimeLength>, &Simulation<'_, F, N>),
     losses: (&family::Loss<'_>, &Loss<'_, N>),
     (start, end): (&State<N>, f64),

@@ -7,6 +7,7 @@ mod differences;
 mod largest;
 
 mod constrained;
+mod constrained_events;
 mod events;
 mod gradients;
 mod orbits;

@@ -7,6 +7,8 @@
 //! or with constraints are solved by one sparse matrix for the rates at all points.
 
 #[cfg(feature = "sparse")]
+mod allowed;
+#[cfg(feature = "sparse")]
 mod backwards;
 #[cfg(feature = "sparse")]
 mod blocked;
@@ -50,6 +52,8 @@ mod transition;
 #[cfg(feature = "sparse")]
 mod view;
 
+#[cfg(feature = "sparse")]
+pub use allowed::Allowed;
 #[cfg(feature = "sparse")]
 pub use backwards::Backwards;
 pub use controlled::Controlled;

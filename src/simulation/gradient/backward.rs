@@ -159,6 +159,7 @@ impl<M: family::Model> Pass<'_, '_, M> {
             while let Some((_, record)) = records.next_if(|(at, _)| *at == self.left) {
                 match record {
                     Between::Node(number) => self.look(*number)?,
+                    Between::Kicked(kicked) => self.to.adjoint.kick(kicked.t, &kicked.with)?,
                     Between::Acted => self.pass_event(&mut records)?,
                     Between::Set(_) => {
                         return Err(RunErrorKind::SetUnsupported { call: CALL }.into());
@@ -197,9 +198,6 @@ impl<M: family::Model> Pass<'_, '_, M> {
         let place = (element.t, element.h);
         let end = (self.to.adjoint).pass(place, &element.before, inside.first())?;
         element.check(self.to.model, &end, self.to.control.tolerance)?;
-        if let Some(kicked) = &element.kicked {
-            self.to.adjoint.kick(element.t, &kicked.with)?;
-        }
         Ok(())
     }
 
@@ -323,7 +321,7 @@ fn before_action<'t, 'm, M>(records: &mut Records<'t, 'm, M>) -> Option<(&'t Cut
         match record {
             Between::Cut(cut) => return Some((&**cut, nodes)),
             Between::Node(number) => nodes.push(*number),
-            Between::Acted | Between::Set(_) => {}
+            Between::Acted | Between::Set(_) | Between::Kicked(_) => {}
         }
     }
     None

@@ -36,8 +36,8 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// [`RunErrorKind::Loss`](crate::RunErrorKind::Loss) if the loss does not fit the model or the span.
     /// [`RunErrorKind::Transition`](crate::RunErrorKind::Transition) if an event has no derivative,
     /// [`RunErrorKind::SetUnsupported`](crate::RunErrorKind::SetUnsupported) if an event [sets](crate::Act::Set) a
-    /// parameter. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`; with
-    /// constraints, for events that change the state or end the run; and if steps were so long that they had to be cut.
+    /// parameter. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, and if
+    /// steps were so long that they had to be cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn gradient(
         &self,

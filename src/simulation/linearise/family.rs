@@ -11,10 +11,11 @@ use tfe_runtime::family::{self, FamilyState};
 use {
     super::super::retrace::Retrace,
     super::super::sensitive::family::Carrying,
-    super::super::trail::{Between, Element},
+    super::super::trail::{Between, Element, Kicked},
     crate::constraints::allowed::{self, basis_of},
     crate::error::RunErrorKind,
     nalgebra::DMatrix,
+    tfe_runtime::StepError,
     tfe_runtime::family::{OperatorError, TransitionOperator},
 };
 
@@ -32,15 +33,15 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`](crate::RunErrorKind::Transition) if an
     /// event has no derivative; [`RunErrorKind::SetByState`](crate::RunErrorKind::SetByState) if an event
     /// [sets](crate::Act::Set) a parameter to a value that depends on the state.
-    /// [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`; with constraints,
-    /// for events that change the state or end the run; and if steps were so long that they had to be cut.
+    /// [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the feature `sparse`, and if steps were
+    /// so long that they had to be cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_linearised(
         &self,
         start: FamilyState,
         span: Range<f64>,
     ) -> Result<Linearised<0, RunTimeLength>, RunError<0, RunTimeLength>> {
-        let trail = Trail::over_events();
+        let trail = Trail::new();
         let (motion, trail) = self.trailed("run_linearised", start, &span, trail)?;
         #[cfg(feature = "sparse")]
         return self.linearised(motion, &trail);
@@ -62,22 +63,22 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             carrying: Carrying::new(self.model.len(), &[]),
             is_across: false,
             transitions: Vec::with_capacity(trail.elements.len()),
+            bases: Vec::new(),
         };
         if let Err(kind) = self.retrace("run_linearised", trail, &[], &mut matrices) {
             return Err(RunError::new(kind, motion));
         }
         matrices.close();
-        let transitions = matrices.transitions;
-        let elements = &trail.elements;
+        let Matrices {
+            transitions, bases, ..
+        } = matrices;
         let reduced = M::CONSTRAINED.then(|| {
-            if elements.is_empty() {
+            if transitions.is_empty() {
                 let start = motion.last();
                 let basis = basis_of(&*self.model, start.t, &start.state());
                 return allowed::identity(basis);
             }
-            let starts = elements.iter();
-            let bases = starts.map(|element| basis_of(&*self.model, element.t, element.node()));
-            let bases = bases.collect::<Result<Vec<_>, _>>()?;
+            let bases = bases.into_iter().collect::<Result<Vec<_>, _>>()?;
             allowed::reduced(&bases, transitions.iter())
         });
         Ok(Linearised::with(motion, transitions, reduced))
@@ -89,13 +90,21 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
 struct Matrices {
     /// The derivatives since the end of the last matrix.
     carrying: Carrying,
-    /// Whether an event has occurred since then.
+    /// Whether an event or impulses that constraints react to have occurred since then.
     is_across: bool,
     transitions: Vec<DMatrix<f64>>,
+    /// Bases of the motions that the constraints allow, at the start of each matrix; for models with constraints.
+    bases: Vec<Result<DMatrix<f64>, StepError>>,
 }
 
 #[cfg(feature = "sparse")]
 impl Matrices {
+    fn begin<M: family::Model>(&mut self, model: &M, t: f64, state: &FamilyState) {
+        if M::CONSTRAINED && !self.is_across {
+            self.bases.push(basis_of(model, t, state));
+        }
+    }
+
     /// Ends a matrix that spans events.
     fn close(&mut self) {
         if self.is_across {
@@ -113,29 +122,33 @@ impl<'m, M: family::Model> Retrace<'m, M> for Matrices {
         element: &Element,
         transition: &TransitionOperator,
     ) -> Result<(), OperatorError> {
+        self.begin(model, element.t, &element.before);
         let ends = element.moves.1;
         if self.is_across || ends {
-            self.carrying.pass(model, element, transition, &[])?;
+            self.carrying.pass(element, transition)?;
+            // The event that ends the element follows.
+            self.is_across = true;
             if !ends {
                 self.close();
             }
             return Ok(());
         }
-        let mut matrix = transition.matrix();
-        if let Some(kicked) = &element.kicked {
-            let kick = family::Kick::of(model, element.t, &kicked.with, &[])?;
-            let mut kicks = DMatrix::identity(matrix.nrows(), matrix.ncols());
-            for mut column in kicks.column_iter_mut() {
-                kick.apply(column.as_mut_slice());
-            }
-            matrix *= kicks;
-        }
-        self.transitions.push(matrix);
+        self.transitions.push(transition.matrix());
         Ok(())
     }
 
+    fn kicked(&mut self, model: &M, kicked: &Kicked) -> Result<(), OperatorError> {
+        self.begin(model, kicked.t, &kicked.before);
+        self.is_across = true;
+        self.carrying.kick(model, kicked)
+    }
+
     fn between(&mut self, model: &M, between: &Between<'m, M>) -> Result<(), RunErrorKind> {
-        self.is_across |= matches!(between, Between::Cut(_));
+        if let Between::Cut(cut) = between {
+            let severed = cut.severed();
+            self.begin(model, severed.begin, severed.before);
+            self.is_across = true;
+        }
         self.carrying.between(model, between)
     }
 }

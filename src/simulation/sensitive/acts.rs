@@ -63,6 +63,22 @@ where
         }
     }
 
+    /// The size of a change relative to the state at the event.
+    fn size(&self, change: &Change<N, L>) -> f64 {
+        let (q, p) = self.scales();
+        larger(largest(change.q.as_ref()) / q, largest(change.p.as_ref()) / p)
+    }
+
+    /// A motion along a change and in time.
+    pub(super) fn towards(&self, change: Change<N, L>, time: f64) -> Way<N, L> {
+        Way {
+            distance: DISTANCE / scale(self.size(&change)),
+            change,
+            time,
+            ..self.still()
+        }
+    }
+
     /// The effect of a parameter alone, with a longer step of differences.
     pub(super) fn by_parameter(&self, index: usize) -> (Way<N, L>, f64) {
         let size = scale(self.model.parameter_value(index).abs());
@@ -78,7 +94,7 @@ where
 
     /// The scales of coordinates and of momenta. At an event something vanishes, possibly the only coordinate; the
     /// change over a step is then the better scale.
-    pub(super) fn scales(&self) -> (f64, f64) {
+    fn scales(&self) -> (f64, f64) {
         let (event, step) = (self.severed.event, self.severed.step.abs());
         let of = |values: &L::Vector, rate: &L::Vector| {
             let values = largest(values.as_ref());
@@ -254,15 +270,9 @@ where
 
     /// How the event moves with a column at fixed parameters; `None` if it does not.
     fn motion(&self, column: usize) -> Option<Way<N, L>> {
-        let (q, p) = self.jump.scales();
         let change = Change::<N, L>::of_column(&self.jump.severed.event.q, self.at, column);
-        let size = larger(largest(change.q.as_ref()) / q, largest(change.p.as_ref()) / p);
         let time = self.times[column];
-        (size != 0.0 || time != 0.0).then(|| Way {
-            change,
-            time,
-            distance: DISTANCE / scale(size),
-            ..self.jump.still()
-        })
+        let is_moved = self.jump.size(&change) != 0.0 || time != 0.0;
+        is_moved.then(|| self.jump.towards(change, time))
     }
 }

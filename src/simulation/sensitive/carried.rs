@@ -111,6 +111,12 @@ impl Carried {
         std::mem::replace(&mut self.before.state, DMatrix::identity(size, columns))
     }
 
+    /// The indices of the parameters.
+    #[cfg(feature = "sparse")]
+    pub(in crate::simulation) fn indices(&self) -> &[usize] {
+        &self.indices
+    }
+
     pub(in crate::simulation) fn columns(&self) -> usize {
         self.before.state.ncols()
     }

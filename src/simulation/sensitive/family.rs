@@ -10,7 +10,7 @@ use tfe_runtime::family::{self, FamilyState};
 #[cfg(feature = "sparse")]
 use {
     super::super::retrace::Retrace,
-    super::super::trail::{Between, Element},
+    super::super::trail::{Between, Element, Kicked},
     super::carried::{Along, AlongPiece, Carried, Reached},
     crate::error::RunErrorKind,
     crate::motion::Motion,
@@ -34,8 +34,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
     /// [`RunError`], as from [`run`](Self::run); [`RunErrorKind::Transition`](crate::RunErrorKind::Transition) if an
     /// event has no derivative; [`RunErrorKind::SetUnsupported`](crate::RunErrorKind::SetUnsupported) if an event
     /// [sets](crate::Act::Set) a parameter. [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported) without the
-    /// feature `sparse`; with constraints, for events that change the state or end the run; and if steps were so long
-    /// that they had to be cut.
+    /// feature `sparse`, and if steps were so long that they had to be cut.
     #[cfg_attr(feature = "sparse", doc = include_str!("family.md"))]
     pub fn run_sensitive(
         &self,
@@ -68,7 +67,6 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
                 1 => carrying.with_inside(),
                 _ => carrying,
             },
-            parameters: &parameters,
             motion: &motion,
         };
         let done = self.retrace("run_sensitive", trail, &parameters, &mut course);
@@ -84,7 +82,6 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
 #[cfg(feature = "sparse")]
 struct Course<'a> {
     carrying: Carrying,
-    parameters: &'a [usize],
     motion: &'a Motion<0, RunTimeLength>,
 }
 
@@ -92,12 +89,15 @@ struct Course<'a> {
 impl<'m, M: family::Model> Retrace<'m, M> for Course<'_> {
     fn element(
         &mut self,
-        model: &M,
+        _: &M,
         element: &Element,
         transition: &TransitionOperator,
     ) -> Result<(), OperatorError> {
-        let parameters = self.parameters;
-        self.carrying.pass(model, element, transition, parameters)
+        self.carrying.pass(element, transition)
+    }
+
+    fn kicked(&mut self, model: &M, kicked: &Kicked) -> Result<(), OperatorError> {
+        self.carrying.kick(model, kicked)
     }
 
     fn between(&mut self, model: &M, between: &Between<'m, M>) -> Result<(), RunErrorKind> {
@@ -134,29 +134,37 @@ impl Carrying {
         }
     }
 
-    /// Carries the derivatives over an element; `parameters` are the indices of those of `transition`.
-    pub(in crate::simulation) fn pass<M: family::Model>(
+    /// Carries the derivatives over impulses on a model with constraints.
+    pub(in crate::simulation) fn kick<M: family::Model>(
         &mut self,
         model: &M,
+        kicked: &Kicked,
+    ) -> Result<(), OperatorError> {
+        let kick = family::Kick::of(model, kicked.t, &kicked.with, self.carried.indices())?;
+        let state = &mut self.carried.before.state;
+        let size = state.nrows();
+        for mut column in state.column_iter_mut() {
+            kick.apply(column.as_mut_slice());
+        }
+        let by_parameters = kick.by_parameters().iter();
+        for (by, mut column) in by_parameters.zip(state.column_iter_mut().skip(size)) {
+            let mut of_p = column.rows_mut(0, size / 2);
+            of_p += DVector::from_column_slice(by);
+        }
+        Ok(())
+    }
+
+    /// Carries the derivatives over an element.
+    pub(in crate::simulation) fn pass(
+        &mut self,
         element: &Element,
         transition: &TransitionOperator,
-        parameters: &[usize],
     ) -> Result<(), OperatorError> {
+        let count = self.carried.indices().len();
         let keeps = self.carried.keeps_inside();
-        let Before { state, start } = &mut self.carried.before;
+        let Before { state, start } = &self.carried.before;
         let (size, columns) = state.shape();
-        if let Some(kicked) = &element.kicked {
-            let kick = family::Kick::of(model, element.t, &kicked.with, parameters)?;
-            for mut column in state.column_iter_mut() {
-                kick.apply(column.as_mut_slice());
-            }
-            let by_parameters = kick.by_parameters().iter();
-            for (by, mut column) in by_parameters.zip(state.column_iter_mut().skip(size)) {
-                let mut of_p = column.rows_mut(0, size / 2);
-                of_p += DVector::from_column_slice(by);
-            }
-        }
-        let (ends, count) = (element.moves.1, parameters.len());
+        let ends = element.moves.1;
         let start = start.as_ref().filter(|_| element.moves.0);
         // Adds the derivatives by parameters, and those by the start time of the element if an event moves it.
         let add = |by: &[Vec<f64>], to: &mut DMatrix<f64>| {
@@ -235,7 +243,7 @@ impl Carrying {
         between: &Between<'_, M>,
     ) -> Result<(), RunErrorKind> {
         match between {
-            Between::Node(_) => {}
+            Between::Node(_) | Between::Kicked(_) => {}
             Between::Acted => self.carried.acted(),
             Between::Set(_) => return self.carried.set(),
             Between::Cut(cut) => {

@@ -132,13 +132,16 @@ impl DenseElement {
     }
 
     /// The Legendre coefficients of dq/dτ, a row of n each, followed by those of dp/dτ; empty for an element that was
-    /// [cut](crate::Statistics::cuts), and for one with constraints, whose momenta jump.
+    /// [cut](crate::Statistics::cuts).
     #[must_use]
     pub fn coefficients(&self) -> Vec<f64> {
         match &self.momenta {
             Momenta::Rates(rates) => [&self.rates[..], rates].concat(),
             #[cfg(feature = "sparse")]
-            Momenta::Values(_) => Vec::new(),
+            Momenta::Values(values) => {
+                let rates = rates_of(values, self.start.q.len());
+                [&self.rates[..], &rates].concat()
+            }
         }
     }
 
@@ -326,14 +329,31 @@ pub(super) fn jumps(scheme: &SchemeRef<'_>) -> Vec<f64> {
         let Momenta::Values(values) = polynomial.momenta else {
             return weights;
         };
-        // P_j′ = Σ 2 (2k + 1) P_k over k = j − 1, j − 3, …
-        for (j, value) in values.iter().enumerate() {
-            for k in (0..j).rev().step_by(2) {
-                weights[k * (points + 2) + column] += 2.0 * (2 * k + 1) as f64 * value;
-            }
+        for (k, rate) in rates_of(&values, 1).into_iter().enumerate() {
+            weights[k * (points + 2) + column] = rate;
         }
     }
     weights
+}
+
+/// The Legendre coefficients of the derivative by τ of a polynomial, from its own; a row of n for each.
+///
+/// ```text
+/// P_j′ = Σ 2 (2k + 1) P_k over k = j − 1, j − 3, …
+/// ```
+#[cfg(feature = "sparse")]
+fn rates_of(values: &[f64], n: usize) -> Vec<f64> {
+    let n = n.max(1);
+    let mut rates = vec![0.0; values.len().saturating_sub(n)];
+    for (j, row) in values.chunks_exact(n).enumerate() {
+        for k in (0..j).rev().step_by(2) {
+            let factor = 2.0 * (2 * k + 1) as f64;
+            for (rate, value) in rates[k * n..(k + 1) * n].iter_mut().zip(row) {
+                *rate += factor * value;
+            }
+        }
+    }
+    rates
 }
 
 /// Adds Σ_m weights_m rows_m.

@@ -8,6 +8,7 @@ use super::point;
 use super::projection::{Explicit, NodeWeights, Places, Projection};
 use super::rows::Rows;
 use crate::condense::add_multiple;
+use crate::dual::Dual;
 use crate::error::StepError;
 use crate::scheme::{MAX_RATES, SchemeRef};
 use alloc::sync::Arc;
@@ -112,24 +113,25 @@ impl Held {
         })
     }
 
-    /// The direct effect of a parameter; changes of the reactions are added to the forces at the points.
+    /// The direct effect of a change of the times and of a parameter: `moved` gives the time at a fraction of the
+    /// element with its derivative, and with the parameter. Changes of the reactions are added to the forces at the
+    /// points.
     pub(super) fn explicit<M: Model>(
         &self,
         model: &M,
-        parameter: usize,
+        moved: &dyn Fn(f64) -> Dual,
         solved: &Solved<'_>,
         end_momentum: Vec<f64>,
         forces: &mut [Vec<f64>],
     ) -> Explicit {
-        let at = |t: f64, q: &[f64]| self.places.by_parameter(model, (t, q), parameter);
-        let mut explicit = self.end.explicit(
-            &self.places,
-            at(solved.t + solved.h, solved.end.0),
-            end_momentum,
-        );
+        let at = |part: f64, q: &[f64]| {
+            let still: Vec<Dual> = q.iter().map(|q| Dual::new(*q, 0.0)).collect();
+            self.places.slopes(model, moved(part), &still)
+        };
+        let end = at(1.0, solved.end.0);
+        let mut explicit = self.end.explicit(&self.places, end, end_momentum);
         for ((l, point), force) in solved.points.iter().enumerate().zip(forces) {
-            let time = solved.t + solved.h * solved.scheme.nodes[l];
-            let slopes = at(time, &point.q);
+            let slopes = at(solved.scheme.nodes[l], &point.q);
             self.places
                 .rows
                 .add_transposed(&slopes.rows, -1.0, &point.mu_rate, force);
@@ -137,7 +139,7 @@ impl Held {
         }
         let n = solved.start.len();
         explicit.impulse = vec![0.0; n];
-        let start = at(solved.t, solved.start);
+        let start = at(0.0, solved.start);
         self.places
             .rows
             .add_transposed(&start.rows, 1.0, &self.first, &mut explicit.impulse);

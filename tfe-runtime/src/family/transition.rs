@@ -160,12 +160,10 @@ impl TransitionOperator {
 
     /// The same, with the derivatives along directions that may differ between steps;
     /// [`by_parameters`](Self::by_parameters) then has one entry for each direction. The index of a [`Parameter`] of
-    /// either variant is that among all parameters of the model. For models with constraints, directions cannot change
-    /// the start time or the length of a step.
+    /// either variant is that among all parameters of the model.
     ///
     /// # Errors
-    /// As [`of_steps_by`](Self::of_steps_by); [`ModelError::ConstraintsNotSupported`] for a direction that changes the
-    /// start time or the length of a step of a model with constraints.
+    /// As [`of_steps_by`](Self::of_steps_by).
     pub fn of_steps_towards<'s, M: Model>(
         model: &M,
         element: Element,

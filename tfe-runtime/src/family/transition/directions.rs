@@ -5,7 +5,7 @@ use super::super::projection::Explicit;
 use super::super::rates::Rates;
 use super::super::view::View;
 use super::{Change, OperatorError, TransitionOperator};
-use crate::condense::{Direction, Parameter};
+use crate::condense::{Direction, Parameter, add_multiple};
 use crate::consistency::ModelError;
 use crate::dual::Dual;
 use crate::scheme::Tables as _;
@@ -72,15 +72,15 @@ impl TransitionOperator {
                 true => 0.0,
                 false => length * sum(weights, a),
             };
-            let is_timed = time != 0.0 || length != 0.0;
-            if is_timed && self.held.is_some() {
-                return Err(ModelError::ConstraintsNotSupported.into());
-            }
+            // The time at a fraction of the element.
+            let moved = |part: f64| {
+                let time = Dual::new(t + h * part, time + length * part);
+                time.by_parameter(parameter)
+            };
             let (mut momenta, mut forces) = (Vec::new(), Vec::new());
             for (l, point) in rates.points.iter().enumerate() {
                 let node = self.table.view().nodes[l];
-                let time = Dual::new(t + h * node, time + length * node).by_parameter(parameter);
-                let mut by = view.answer(time, &point.q, &point.v);
+                let mut by = view.answer(moved(node), &point.q, &point.v);
                 self.bend(l, &still, &by.velocity, &mut unused, &mut by.force);
                 // The change of h F by that of h, divided by h; and the additional force γ v.
                 let own = by.force.iter_mut().zip(&point.force).zip(&point.v);
@@ -90,12 +90,15 @@ impl TransitionOperator {
                 momenta.push(by.momentum);
                 forces.push(by.force);
             }
-            let explicit = self.held.as_ref().zip(parameter).map(|(held, parameter)| {
+            let explicit = self.held.as_ref().map(|held| {
                 let scheme = self.table.view();
                 let solved = rates.solved(&scheme, (t, h), &self.pattern);
                 let (q, v) = solved.end;
-                let end = view.by_parameter(t + h, q, v, parameter).momentum;
-                held.explicit(view, parameter, &solved, end, &mut forces)
+                let end = view.answer(moved(1.0), q, v).momentum;
+                let mut explicit = held.explicit(view, &moved, &solved, end, &mut forces);
+                // The change of h A₀ᵀ m₀ by that of h.
+                add_multiple(&mut explicit.impulse, length / h, rates.impulse_of_start());
+                explicit
             });
             let scheme = self.table.view();
             let mut inside = Vec::new();
