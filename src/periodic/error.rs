@@ -57,8 +57,6 @@ pub enum OrbitError {
         /// Corrections so far.
         iterations: u32,
     },
-    /// Orbits with events are not supported for models with constraints; declare the model in minimal coordinates.
-    HybridConstraints,
     /// The call is not supported for this kind of model, or has no meaning for orbits of this kind.
     Unsupported {
         /// The call.
@@ -135,9 +133,6 @@ impl fmt::Display for OrbitError {
             } => write!(
                 f,
                 "no orbit near the guess: after {iterations} corrections the end of the motion differs from its start by {residual:.1e} of the motion"
-            ),
-            Self::HybridConstraints => f.write_str(
-                "orbits with events are not supported for models with constraints: declare the model in minimal coordinates",
             ),
             Self::AtRest => f.write_str(
                 "the search for an orbit ends at an equilibrium, which repeats after any time: begin from a moving state nearer to the orbit \

@@ -6,20 +6,21 @@ use super::phase::Period;
 use super::rest::{Extent, is_at_rest};
 use super::setup::PeriodicOrbit;
 use crate::assembly::MeshError;
+use crate::error::RunErrorKind;
+use crate::length::{FixedLength, Length};
 use crate::linearised::Linearised;
 use crate::motion::{Motion, Node, Setting};
 use crate::numbers::{larger, largest, raise};
 use crate::periodic_schur::Multiplier;
-use crate::sensitivity::varied::Varied;
-use crate::simulation::Simulation;
+use crate::simulation::{Differentiable, Simulation};
 use nalgebra::{Complex, DMatrix, DVector};
-use tfe_runtime::{Model, State};
+use tfe_runtime::family::ModelError;
 
-impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
+impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
     /// A periodic orbit of a simulation with [events](Simulation::on) that change the state (a hybrid system): an
     /// oscillator that hits a wall, a machine that switches. Model, element and events are those of the simulation;
-    /// the step sizes follow from the number of elements in a period. Models with constraints are not supported
-    /// ([`OrbitError::HybridConstraints`]): declare them in minimal coordinates.
+    /// the step sizes follow from the number of elements in a period. A model of run-time length needs the feature
+    /// `sparse`.
     ///
     /// ```
     /// use std::f64::consts::TAU;
@@ -53,14 +54,18 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// # Ok(())
     /// # }
     /// ```
-    pub fn of_simulation(simulation: &Simulation<'m, M, N>) -> HybridOrbits<'m, M, N> {
+    #[cfg_attr(feature = "sparse", doc = include_str!("hybrid.md"))]
+    pub fn of_simulation(simulation: &Simulation<'m, M, N, L>) -> HybridOrbits<'m, M, N, L>
+    where
+        M: Differentiable<N, L>,
+    {
         HybridOrbits {
             simulation: simulation.clone(),
             elements: 40,
             start: 0.0,
             period: Period::Missing,
             guess: None,
-            advance: [0.0; N],
+            advance: None,
             tolerance: 1e-13,
             max_iterations: 50,
         }
@@ -82,19 +87,27 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
 /// The motion from the guess should meet the events of the orbit, and should not start at an event. If no correction
 /// reduces r, but r is larger than rounding errors, there is no orbit: the model has none of this period, or the
 /// elements are too coarse for a conservative model.
+///
+/// With constraints, a motion satisfies them from its first element on, so that the equation holds for all components;
+/// guess and corrected starts are moved to the nearest states that satisfy them.
 #[derive(Debug)]
-pub struct HybridOrbits<'m, M, const N: usize> {
-    pub(super) simulation: Simulation<'m, M, N>,
+pub struct HybridOrbits<'m, M, const N: usize, L: Length<N> = FixedLength> {
+    pub(super) simulation: Simulation<'m, M, N, L>,
     pub(super) elements: usize,
     pub(super) start: f64,
     pub(super) period: Period,
-    guess: Option<State<N>>,
-    advance: [f64; N],
+    guess: Option<L::State>,
+    /// `None`: zeros.
+    advance: Option<L::Vector>,
     tolerance: f64,
     max_iterations: u32,
 }
 
-impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
+impl<'m, M, const N: usize, L> HybridOrbits<'m, M, N, L>
+where
+    M: Differentiable<N, L>,
+    L: Length<N>,
+{
     /// Sets the number of elements in a period, 40 by default; events cut some of them.
     #[must_use]
     pub fn elements(mut self, elements: usize) -> Self {
@@ -125,15 +138,15 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
 
     /// Sets the first guess of the state at the start of the period.
     #[must_use]
-    pub fn guess_from(mut self, state: State<N>) -> Self {
+    pub fn guess_from(mut self, state: L::State) -> Self {
         self.guess = Some(state);
         self
     }
 
     /// Sets by how much the coordinates grow over a period, for example a full turn of an angle; zero by default.
     #[must_use]
-    pub fn advance(mut self, advance: [f64; N]) -> Self {
-        self.advance = advance;
+    pub fn advance(mut self, advance: L::Vector) -> Self {
+        self.advance = Some(advance);
         self
     }
 
@@ -157,27 +170,23 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     /// # Errors
     /// [`OrbitError`]: [`Run`](OrbitError::Run) if a motion fails, [`Stalled`](OrbitError::Stalled) if no orbit is
     /// found from the guess, [`AtRest`](OrbitError::AtRest) if the search for an unknown period ends at an
-    /// equilibrium, [`HybridConstraints`](OrbitError::HybridConstraints) for models with constraints.
-    pub fn solve(&self) -> Result<HybridOrbit<N>, OrbitError> {
+    /// equilibrium.
+    pub fn solve(&self) -> Result<HybridOrbit<N, L>, OrbitError> {
         /// Corrections below this that no longer decrease are rounding errors.
         const ROUNDED: f64 = 1e-9;
         const MAX_HALVINGS: u32 = 12;
-        if const { !M::CONSTRAINTS.is_empty() } {
-            return Err(OrbitError::HybridConstraints);
-        }
         if self.elements == 0 {
             return Err(MeshError::NoElements.into());
         }
         let mut period = self.period.checked()?;
         let is_free = matches!(self.period, Period::Guess(_));
-        if is_free && M::FACTS.time_dependent {
+        if is_free && M::DEPENDS_ON_TIME {
             return Err(OrbitError::ForcedPeriod);
         }
-        let mut state = self.guess.unwrap_or(State {
-            q: [0.0; N],
-            p: [0.0; N],
-        });
-        let mut run = self.run(&state, period)?;
+        self.check_advance()?;
+        let guess = self.guess.clone();
+        let guess = guess.unwrap_or_else(|| self.simulation.model().zero_state());
+        let mut run = self.run(&guess, period)?;
         let guess = Extent::of_nodes(run.motion());
         self.check_moves(&run, &guess)?;
         let mut last = f64::INFINITY;
@@ -208,17 +217,13 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
                 iterations,
             });
             for _ in 0..=MAX_HALVINGS {
-                let moved = State {
-                    q: std::array::from_fn(|a| {
-                        state.q[a] + part * change[N + a] * scales.of(N + a)
-                    }),
-                    p: std::array::from_fn(|a| state.p[a] + part * change[a] * scales.of(a)),
-                };
+                let start = run.motion().states()[0].state();
+                let moved = moved::<N, L>(&start, |row| part * change[row] * scales.of(row));
                 let time = period + part * stretch;
                 if let Ok(run) = self.run(&moved, time)
                     && (is_done || largest(self.residual(&run, &scales).as_slice()) < apart)
                 {
-                    tried = Ok((moved, time, run));
+                    tried = Ok((time, run));
                     break;
                 }
                 part *= 0.5;
@@ -226,14 +231,14 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
             // The correction is rounding error, so that no step can improve the residual.
             let is_best = tried.is_err() && size < ROUNDED;
             if !is_best {
-                (state, period, run) = tried?;
+                (period, run) = tried?;
                 self.check_moves(&run, &guess)?;
             }
             if is_done || is_best {
                 // A residual that no correction reduces means that the motion does not close.
                 let residual = largest(self.residual(&run, &scales).as_slice());
                 if residual <= self.tolerance.max(ROUNDED) * gain.max(1.0) {
-                    return self.found(run, state, period, iterations);
+                    return self.found(run, period, iterations);
                 }
                 return Err(OrbitError::Stalled {
                     residual,
@@ -250,7 +255,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     }
 
     /// Refuses an equilibrium if the period is unknown; with a known period it is a valid orbit.
-    fn check_moves(&self, run: &Linearised<N>, guess: &Extent) -> Result<(), OrbitError> {
+    fn check_moves(&self, run: &Linearised<N, L>, guess: &Extent) -> Result<(), OrbitError> {
         let motion = run.motion();
         let is_free = matches!(self.period, Period::Guess(_));
         if is_free && is_at_rest(Extent::of_nodes(motion), guess, || motion.clone()) {
@@ -259,22 +264,47 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         Ok(())
     }
 
+    /// Refuses an advance of another length than that of the coordinates.
+    fn check_advance(&self) -> Result<(), OrbitError> {
+        let expected = self.simulation.model().coordinates();
+        let length = self
+            .advance
+            .as_ref()
+            .map_or(expected, |advance| advance.as_ref().len());
+        if length == expected {
+            return Ok(());
+        }
+        let kind = RunErrorKind::Family(ModelError::StateLength {
+            vector: "of the advance",
+            length,
+            expected,
+        });
+        Err(OrbitError::Run(kind))
+    }
+
     /// The same problem for another simulation.
-    pub(super) fn of(&self, simulation: Simulation<'m, M, N>) -> Self {
+    pub(super) fn of(&self, simulation: Simulation<'m, M, N, L>) -> Self {
         Self {
             simulation,
+            guess: self.guess.clone(),
+            advance: self.advance.clone(),
             ..*self
         }
     }
 
-    pub(super) fn run(&self, state: &State<N>, period: f64) -> Result<Linearised<N>, OrbitError> {
+    /// The motion over a period, from the nearest state that satisfies the constraints.
+    pub(super) fn run(
+        &self,
+        state: &L::State,
+        period: f64,
+    ) -> Result<Linearised<N, L>, OrbitError> {
         if !(period > 0.0 && period.is_finite()) {
             return Err(OrbitError::Period { period });
         }
+        let start = self.simulation.model().nearest_allowed(self.start, state);
         let simulation = self.simulation.clone().record_every(1);
-        let run = simulation
-            .step(period / self.elements as f64)
-            .run_linearised(*state, self.start..self.start + period);
+        let simulation = simulation.step(period / self.elements as f64);
+        let run = M::linearised(&simulation, start, self.start..self.start + period);
         let run = run.map_err(|error| OrbitError::Run(error.kind().clone()))?;
         let last = run.motion().last().t;
         if last != self.start + period {
@@ -285,23 +315,26 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
     }
 
     /// y(T) − y(0) − (0, advance), in the order (p, q), divided by the scales.
-    fn residual(&self, run: &Linearised<N>, scales: &Scales) -> DVector<f64> {
-        let nodes = run.motion().states();
-        let (first, last) = (&nodes[0], run.motion().last());
-        DVector::from_fn(2 * N, |row, _| match row.checked_sub(N) {
-            None => (last.p[row] - first.p[row]) / scales.of(row),
-            Some(a) => (last.q[a] - first.q[a] - self.advance[a]) / scales.of(row),
+    fn residual(&self, run: &Linearised<N, L>, scales: &Scales) -> DVector<f64> {
+        let (first, last) = (&run.motion().states()[0], run.motion().last());
+        let n = first.q.as_ref().len();
+        let grown = |a: usize| self.advance.as_ref().map_or(0.0, |grown| grown.as_ref()[a]);
+        let change = |of: fn(&Node<N, L>) -> &L::Vector, a: usize| -> f64 {
+            of(last).as_ref()[a] - of(first).as_ref()[a]
+        };
+        DVector::from_fn(2 * n, |row, _| match row.checked_sub(n) {
+            None => change(|node| &node.p, row) / scales.of(row),
+            Some(a) => (change(|node| &node.q, a) - grown(a)) / scales.of(row),
         })
     }
 
     fn found(
         &self,
-        run: Linearised<N>,
-        start: State<N>,
+        run: Linearised<N, L>,
         period: f64,
         iterations: u32,
-    ) -> Result<HybridOrbit<N>, OrbitError> {
-        if let Some(left) = left_over(self.simulation.model(), run.motion().settings()) {
+    ) -> Result<HybridOrbit<N, L>, OrbitError> {
+        if let Some(left) = left_over::<M, L, N>(self.simulation.model(), run.motion().settings()) {
             return Err(OrbitError::ParameterLeft {
                 parameter: left.parameter.clone(),
                 value: left.value,
@@ -312,7 +345,7 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
         let (motion, transitions) = run.into_parts();
         let trivial = self.trivial(&floquet, &motion);
         Ok(HybridOrbit {
-            start,
+            start: motion.states()[0].state(),
             period,
             multipliers: floquet.iter().map(Multiplier::to_complex).collect(),
             floquet,
@@ -325,15 +358,16 @@ impl<'m, M: Model<N>, const N: usize> HybridOrbits<'m, M, N> {
 
     /// Whether one multiplier is 1 because the model is autonomous. With a known period this need not be so: actions
     /// may depend on time, and an equilibrium has no such multiplier.
-    fn trivial(&self, floquet: &[Multiplier], motion: &Motion<N>) -> bool {
+    fn trivial(&self, floquet: &[Multiplier], motion: &Motion<N, L>) -> bool {
         /// The largest distance of that multiplier from 1.
         const NEAR: f64 = 1e-4;
         if matches!(self.period, Period::Guess(_)) {
             return true;
         }
-        let moves = motion.states().iter().any(|node| node.v != [0.0; N]);
+        let mut velocities = motion.states().iter().flat_map(|node| node.v.as_ref());
+        let moves = velocities.any(|v| *v != 0.0);
         let is_one = |one: &Multiplier| one.log_modulus.hypot(one.argument) < NEAR;
-        !M::FACTS.time_dependent && moves && floquet.iter().any(is_one)
+        !M::DEPENDS_ON_TIME && moves && floquet.iter().any(is_one)
     }
 }
 
@@ -416,15 +450,16 @@ impl Scales {
 /// The scale of all components of a kind is the largest of them. Much smaller components, such as an angle beside a
 /// distance, have scales of their own, unless they are small enough to be rounding errors of the largest, as components
 /// that vanish by symmetry.
-pub(super) fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
+pub(super) fn scales<const N: usize, L: Length<N>>(motion: &Motion<N, L>) -> Scales {
     const SMALL: f64 = 1e-3;
     const ROUNDINGS: f64 = 1e-12;
 
-    let mut own = Vec::with_capacity(2 * N);
-    let mut of_kind = |of: fn(&State<N>) -> &[f64; N]| {
-        let mut sizes = [0.0_f64; N];
+    let n = motion.last().q.as_ref().len();
+    let mut own = Vec::with_capacity(2 * n);
+    let mut of_kind = |of: fn(&Node<N, L>) -> &L::Vector| {
+        let mut sizes = vec![0.0_f64; n];
         for node in motion.states() {
-            for (size, value) in sizes.iter_mut().zip(of(&node.state())) {
+            for (size, value) in sizes.iter_mut().zip(of(node).as_ref()) {
                 raise(size, value.abs());
             }
         }
@@ -436,61 +471,81 @@ pub(super) fn scales<const N: usize>(motion: &Motion<N>) -> Scales {
         }));
         largest
     };
-    let p = of_kind(|state| &state.p);
-    let q = of_kind(|state| &state.q);
+    let p = of_kind(|node| &node.p);
+    let q = of_kind(|node| &node.q);
     Scales { q, p, own }
 }
 
 /// The first parameter that events have left at another value than at the start: the motion of the next period would
 /// differ.
-fn left_over<'s, M: Model<N>, const N: usize>(
-    model: &M,
-    settings: &'s [Setting],
-) -> Option<&'s Setting> {
+fn left_over<'s, M, L, const N: usize>(model: &M, settings: &'s [Setting]) -> Option<&'s Setting>
+where
+    M: Differentiable<N, L>,
+    L: Length<N>,
+{
+    let names = model.parameter_names();
     let mut lasting = settings.iter().enumerate().filter(|(place, one)| {
         let later = &settings[place + 1..];
         later.iter().all(|later| later.parameter != one.parameter)
     });
     let left = lasting.find(|(_, one)| {
-        let own = model.find_parameter(&one.parameter);
-        own.map(|index| model.parameter(index)) != Some(one.value)
+        let own = names.iter().position(|name| name.is(&one.parameter));
+        own.map(|index| model.parameter_value(index)) != Some(one.value)
     });
     left.map(|(_, one)| one)
 }
 
-/// The flow ẏ = (ṗ, q̇).
-fn rate<M: Model<N>, const N: usize>(model: &M, node: &Node<N>) -> DVector<f64> {
-    let push = model.push(node);
-    let both = push.iter().chain(&node.v);
-    DVector::from_iterator(2 * N, both.copied())
+/// The flow ẏ = (ṗ, q̇), in the order (p, q).
+fn rate<M, L, const N: usize>(model: &M, node: &Node<N, L>) -> DVector<f64>
+where
+    M: Differentiable<N, L>,
+    L: Length<N>,
+{
+    let of_p = model.momentum_rate(node);
+    let (of_p, of_q) = (of_p.as_ref(), node.v.as_ref());
+    DVector::from_iterator(2 * of_q.len(), of_p.iter().chain(of_q).copied())
+}
+
+/// A state plus a change of its components, which are counted in the order (p, q).
+pub(super) fn moved<const N: usize, L: Length<N>>(
+    state: &L::State,
+    change: impl Fn(usize) -> f64,
+) -> L::State {
+    let (q, p) = L::parts(state);
+    let (old_q, old_p) = (q.as_ref(), p.as_ref());
+    let n = old_q.len();
+    L::state(
+        L::from_fn(q, |a| old_q[a] + change(n + a)),
+        L::from_fn(p, |a| old_p[a] + change(a)),
+    )
 }
 
 /// A periodic orbit with events, and its Floquet multipliers; made by [`HybridOrbits::solve`].
 #[derive(Clone, Debug)]
-pub struct HybridOrbit<const N: usize> {
-    start: State<N>,
+pub struct HybridOrbit<const N: usize, L: Length<N> = FixedLength> {
+    start: L::State,
     period: f64,
     floquet: Vec<Multiplier>,
     multipliers: Vec<Complex<f64>>,
     trivial: usize,
-    motion: Motion<N>,
+    motion: Motion<N, L>,
     transitions: Vec<DMatrix<f64>>,
     iterations: u32,
 }
 
-impl<const N: usize> HybridOrbit<N> {
+impl<const N: usize, L: Length<N>> HybridOrbit<N, L> {
     /// The period T, as given or as found.
     pub fn period(&self) -> f64 {
         self.period
     }
 
     /// The state at the start of the period.
-    pub fn start(&self) -> State<N> {
-        self.start
+    pub fn start(&self) -> L::State {
+        self.start.clone()
     }
 
     /// The motion over one period, with its [events](Motion::events) and dense output.
-    pub fn motion(&self) -> &Motion<N> {
+    pub fn motion(&self) -> &Motion<N, L> {
         &self.motion
     }
 
@@ -503,7 +558,9 @@ impl<const N: usize> HybridOrbit<N> {
     /// state at its start, including the effect of events on the state and the change of their times. Entries beyond
     /// 10³⁰⁸ are infinite or NaN.
     pub fn monodromy(&self) -> DMatrix<f64> {
-        let identity = DMatrix::identity(2 * N, 2 * N);
+        let (_, p) = L::parts(&self.start);
+        let size = 2 * p.as_ref().len();
+        let identity = DMatrix::identity(size, size);
         (self.transitions.iter()).fold(identity, |product, matrix| matrix * product)
     }
 

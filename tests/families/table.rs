@@ -211,6 +211,23 @@ macro_rules! calls {
             is_finite(hessian.matrix().as_slice())
         });
         call(
+            "`run_linearised`, `run_sensitive`, `gradient`, `hessian` across events that change the state",
+            &|| {
+                let run = run().on("hit", Crossing::Either, |event| {
+                    Act::Restart(event.after_impact(0.5))
+                });
+                let matrices = run.run_linearised(start(), span())?;
+                assert!(!matrices.motion().events().is_empty());
+                is_finite(matrices.product().as_slice())?;
+                let s = run.run_sensitive(start(), span())?;
+                is_finite(s.by_start().last().as_slice())?;
+                let (_, gradient) = run.gradient(start(), span(), &$loss)?;
+                is_finite(gradient.by_parameters())?;
+                let hessian = run.hessian(start(), span(), &$loss, ["m"])?;
+                is_finite(hessian.matrix().as_slice())
+            },
+        );
+        call(
             "`Motion`: `states`, `at`, `energies`, `outputs`, `warnings`, `arcs`, `write_csv`",
             &|| {
                 let motion = run().run(start(), span())?;
@@ -267,6 +284,13 @@ macro_rules! calls {
                 .elements(10)
                 .period(1.0)
                 .guess_from(rest());
+            assert!(orbit.solve_sensitive()?.by_period().is_some());
+            Ok(())
+        });
+        call("`PeriodicOrbit::of_simulation`", &|| {
+            let orbit = PeriodicOrbit::of_simulation(&run());
+            let orbit = orbit.elements(10).period(1.0).guess_from(rest());
+            assert!(orbit.solve()?.is_stable());
             assert!(orbit.solve_sensitive()?.by_period().is_some());
             Ok(())
         });

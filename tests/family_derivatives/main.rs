@@ -10,5 +10,6 @@ mod constrained;
 mod constrained_events;
 mod events;
 mod gradients;
+mod hybrid;
 mod orbits;
 mod transitions;

@@ -11,6 +11,7 @@ mod convergence;
 #[path = "../common/differences.rs"]
 mod differences;
 mod errors;
+mod hybrid;
 mod models;
 mod orbits;
 mod sensitive;

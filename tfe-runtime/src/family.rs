@@ -53,7 +53,7 @@ mod transition;
 mod view;
 
 #[cfg(feature = "sparse")]
-pub use allowed::Allowed;
+pub use allowed::{Allowed, nearest};
 #[cfg(feature = "sparse")]
 pub use backwards::Backwards;
 pub use controlled::Controlled;

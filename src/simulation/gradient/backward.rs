@@ -209,7 +209,7 @@ impl<M: family::Model> Pass<'_, '_, M> {
         let directions: Vec<_> = moving(element).collect();
         let place = (element.t, element.h);
         let transition = (self.to.adjoint).linearised(place, &element.before, &directions)?;
-        element.check(transition.end(), self.to.control.tolerance)?;
+        element.check(self.to.model, transition.end(), self.to.control.tolerance)?;
         Ok(Solved {
             transition,
             inside: inside.into_iter().next(),

@@ -66,7 +66,10 @@ where
     /// The size of a change relative to the state at the event.
     fn size(&self, change: &Change<N, L>) -> f64 {
         let (q, p) = self.scales();
-        larger(largest(change.q.as_ref()) / q, largest(change.p.as_ref()) / p)
+        larger(
+            largest(change.q.as_ref()) / q,
+            largest(change.p.as_ref()) / p,
+        )
     }
 
     /// A motion along a change and in time.

@@ -1,14 +1,60 @@
-//! The changes of a state that constraints allow, as a projection of all changes (T-78, T-160).
+//! The changes of a state that constraints allow, as a projection of all changes (T-78, T-160), and the nearest state
+//! that satisfies them (T-96).
 
-use super::blocked::Blocked;
-use super::error::ModelError;
+use super::blocked::{Blocked, Place};
+use super::instant::Instant;
 use super::kick::Kick;
-use super::model::{FamilyState, Model};
+use super::model::{FamilyState, Model, slope};
 use super::projection::Places;
 use super::rows::Rows;
 use super::transition::OperatorError;
+use crate::consistency::ModelError;
+use crate::constrained::node::{MOST, is_settled};
+use crate::error::{LegendreError, StepError};
+use crate::legendre::largest;
 use alloc::vec;
 use alloc::vec::Vec;
+
+/// The matrix of the nearest change of the coordinates,
+///
+/// ```text
+/// [ 1  Aᵀ ]
+/// [ A  0  ]
+/// ```
+#[derive(Clone, Debug)]
+struct Bordered {
+    matrix: Blocked,
+    diagonal: Vec<Place>,
+    /// The places of A and of Aᵀ.
+    rows: Vec<(Place, Place)>,
+}
+
+impl Bordered {
+    /// Finds the places; `None` where memory does not suffice.
+    fn new(n: usize, rows: &Rows) -> Option<Self> {
+        let borders = rows.places().flat_map(|(c, a)| [(n + c, a), (a, n + c)]);
+        let places: Vec<(usize, usize)> = (0..n).map(|a| (a, a)).chain(borders).collect();
+        let matrix = Blocked::new(n + rows.phi.len(), 1, &places)?;
+        let pair = |(c, a)| (matrix.place(n + c, a), matrix.place(a, n + c));
+        Some(Self {
+            diagonal: (0..n).map(|a| matrix.place(a, a)).collect(),
+            rows: rows.places().map(pair).collect(),
+            matrix,
+        })
+    }
+
+    /// Factors the matrix of these rows.
+    fn factor(&mut self, rows: &Rows) -> Result<(), StepError> {
+        for place in &self.diagonal {
+            self.matrix.values[place.first] = 1.0;
+        }
+        for ((row, transposed), value) in self.rows.iter().zip(&rows.values) {
+            self.matrix.values[row.first] = *value;
+            self.matrix.values[transposed.first] = *value;
+        }
+        self.matrix.factor()
+    }
+}
 
 /// The projection of changes (δp, δq) of a state that satisfies the constraints onto those that the constraints allow:
 /// the nearest change of the coordinates, then that of the momentum as at an impulse ([`Kick`]).
@@ -24,7 +70,7 @@ use alloc::vec::Vec;
 #[derive(Clone, Debug)]
 pub struct Allowed {
     kick: Kick,
-    matrix: Blocked,
+    matrix: Bordered,
     by_parameters: Vec<Vec<f64>>,
 }
 
@@ -40,22 +86,10 @@ impl Allowed {
         parameters: &[usize],
     ) -> Result<Self, OperatorError> {
         let kick = Kick::of(model, t, state, parameters)?;
-        let (n, m) = (model.len(), model.constraints());
         let mut rows = Rows::new(model);
         rows.evaluate(model, t, &state.q);
-        let borders = rows.places().flat_map(|(c, a)| [(n + c, a), (a, n + c)]);
-        let places: Vec<(usize, usize)> = (0..n).map(|a| (a, a)).chain(borders).collect();
-        let mut matrix = Blocked::new(n + m, 1, &places).ok_or(ModelError::TooLarge)?;
-        for a in 0..n {
-            let place = matrix.place(a, a);
-            matrix.values[place.first] = 1.0;
-        }
-        for ((c, a), value) in rows.places().zip(&rows.values) {
-            for place in [matrix.place(n + c, a), matrix.place(a, n + c)] {
-                matrix.values[place.first] = *value;
-            }
-        }
-        matrix.factor()?;
+        let mut matrix = Bordered::new(model.len(), &rows).ok_or(ModelError::TooLarge)?;
+        matrix.factor(&rows)?;
         let mut allowed = Self {
             kick,
             matrix,
@@ -64,7 +98,7 @@ impl Allowed {
         let constraints = Places::of(model);
         for (number, parameter) in parameters.iter().enumerate() {
             let slopes = constraints.by_parameter(model, (t, &state.q), *parameter);
-            let mut change = vec![0.0; 2 * n];
+            let mut change = vec![0.0; 2 * model.len()];
             allowed.project(&mut change, &slopes.phi);
             let own = &allowed.kick.by_parameters()[number];
             for (p, own) in change.iter_mut().zip(own) {
@@ -91,13 +125,61 @@ impl Allowed {
     fn project(&self, change: &mut [f64], phi: &[f64]) {
         let n = change.len() / 2;
         let q = &mut change[n..];
-        let mut sides = vec![0.0; self.matrix.size()];
+        let mut sides = vec![0.0; self.matrix.matrix.size()];
         sides[..n].copy_from_slice(q);
         for (side, phi) in sides[n..].iter_mut().zip(phi) {
             *side = -phi;
         }
-        self.matrix.solve(&mut sides);
+        self.matrix.matrix.solve(&mut sides);
         q.copy_from_slice(&sides[..n]);
         self.kick.apply(change);
     }
+}
+
+/// The nearest state that satisfies the constraints of a model that has some: the coordinates by Newton's method for
+/// the least |δq|, then the momentum that the constraints leave of the given one.
+///
+/// # Errors
+/// [`OperatorError`] if the constraints are not reached, depend on each other, or allow no velocity.
+pub fn nearest<M: Model>(
+    model: &M,
+    t: f64,
+    state: &FamilyState,
+) -> Result<FamilyState, OperatorError> {
+    let n = model.len();
+    let mut rows = Rows::new(model);
+    let mut matrix = Bordered::new(n, &rows).ok_or(ModelError::TooLarge)?;
+    let (mut q, mut last, mut is_found) = (state.q.clone(), f64::INFINITY, false);
+    for _ in 0..MOST {
+        rows.evaluate(model, t, &q);
+        matrix.factor(&rows)?;
+        let back = state.q.iter().zip(&q).map(|(given, q)| given - q);
+        let mut step: Vec<f64> = back.chain(rows.phi.iter().map(|phi| -phi)).collect();
+        matrix.matrix.solve(&mut step);
+        for (q, step) in q.iter_mut().zip(&step) {
+            *q += step;
+        }
+        let (size, scale) = (largest(&step[..n]), largest(&q));
+        if !(size + scale).is_finite() {
+            return Err(StepError::NonFinite.into());
+        }
+        is_found = is_settled(size, last, scale);
+        last = size;
+        if is_found {
+            break;
+        }
+    }
+    if !is_found {
+        let stalled = LegendreError::Stalled {
+            iterations: MOST,
+            residual: last,
+        };
+        return Err(StepError::from(stalled).into());
+    }
+    let mut instant = Instant::new(model).ok_or(ModelError::TooLarge)?;
+    let p = state.p.clone();
+    let mut nearest = FamilyState { q, p };
+    let v = instant.velocity(model, t, &nearest)?;
+    nearest.p = slope(model, t, &nearest.q, &v);
+    Ok(nearest)
 }

@@ -152,7 +152,7 @@ fn elongation(
     let Node::Product(factors) = graph.node(x).clone() else {
         return None;
     };
-    let (scale, others): (Vec<(ExprId, i32)>, Vec<(ExprId, i32)>) = factors
+    let (scale, others): (Vec<_>, Vec<_>) = factors
         .iter()
         .copied()
         .partition(|(y, _)| is_scale(graph, *y, stiffness));

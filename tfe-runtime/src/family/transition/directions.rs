@@ -6,7 +6,6 @@ use super::super::rates::Rates;
 use super::super::view::View;
 use super::{Change, OperatorError, TransitionOperator};
 use crate::condense::{Direction, Parameter, add_multiple};
-use crate::consistency::ModelError;
 use crate::dual::Dual;
 use crate::scheme::Tables as _;
 use alloc::vec;

@@ -1,0 +1,110 @@
+//! Periodic orbits with events of models with constraints, compared with the same motion in a minimal coordinate.
+
+use std::f64::consts::TAU;
+use tfe::prelude::*;
+
+/// A driven bead on a circle that hits a wall once per period, by its place and by its angle.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - k/2*x^2 + f*cos(omega*t)*x,
+    constraint(circle) = x^2 + y^2 - r^2,
+    force(x) = -c*dot(x),
+    force(y) = -c*dot(y),
+    event(wall) = w - x,
+)]
+struct Bead {
+    m: f64,
+    k: f64,
+    c: f64,
+    f: f64,
+    w: f64,
+    r: f64,
+    omega: f64,
+}
+
+#[dynamics(
+    coordinates(a),
+    lagrangian = m/2*r^2*dot(a)^2 - k/2*r^2*sin(a)^2 + f*cos(omega*t)*r*sin(a),
+    force(a) = -c*r^2*dot(a),
+    event(wall) = w - r*sin(a),
+)]
+struct Angle {
+    m: f64,
+    k: f64,
+    c: f64,
+    f: f64,
+    w: f64,
+    r: f64,
+    omega: f64,
+}
+
+#[test]
+fn orbits_with_impacts_and_constraints_are_those_of_a_minimal_coordinate() {
+    let (m, k, c, f, w, r, omega) = (1.1, 1.2, 0.1, 1.0, 0.05, 5.0_f64, 2.6);
+    let bead = Bead {
+        m,
+        k,
+        c,
+        f,
+        w,
+        r,
+        omega,
+    };
+    let angle = Angle {
+        m,
+        k,
+        c,
+        f,
+        w,
+        r,
+        omega,
+    };
+    let run = Simulation::new(&bead).element(Mixed::<8>);
+    let run = run.on("wall", Crossing::Falling, |event| {
+        Act::Restart(event.after_impact(0.8))
+    });
+    // Near the circle, and not on it.
+    let found = PeriodicOrbit::of_simulation(&run)
+        .start_time(0.9)
+        .period(TAU / omega)
+        .guess_from(bead.state([-0.07, -4.99], [0.58, 0.0]))
+        .solve_sensitive()
+        .expect("an orbit");
+    let beside = Simulation::new(&angle).element(Mixed::<8>);
+    let beside = beside.on("wall", Crossing::Falling, |event| {
+        Act::Restart(event.after_impact(0.8))
+    });
+    let expected = PeriodicOrbit::of_simulation(&beside)
+        .start_time(0.9)
+        .period(TAU / omega)
+        .guess_from(angle.state([-0.014], [0.117]))
+        .solve_sensitive()
+        .expect("an orbit");
+    let (orbit, other) = (found.orbit(), expected.orbit());
+    assert_eq!(orbit.motion().events().len(), 1);
+    assert_eq!(other.motion().events().len(), 1);
+    assert!(orbit.motion().constraint_residual().position <= 1e-13);
+    let (sin, cos) = other.start().q[0].sin_cos();
+    let place = orbit.start().q;
+    let off = [place[0] - r * sin, place[1] + r * cos].map(f64::abs);
+    assert!(off[0] <= 1e-10 && off[1] <= 1e-10, "{off:?}");
+    assert_eq!(orbit.multipliers().len(), 2, "no zeros");
+    for (found, expected) in orbit.multipliers().iter().zip(other.multipliers()) {
+        assert!((found - expected).norm() <= 1e-8, "{found} {expected}");
+    }
+    for name in found.parameters() {
+        let (found, expected) = (found.by(name), expected.by(name));
+        let turn = expected.start().q[0];
+        let grown = if name == "r" { sin } else { 0.0 };
+        let off = found.start().q[0] - (r * cos * turn + grown);
+        assert!(off.abs() <= 1e-8, "{name}: {off:e}");
+        // Differences, which are given where two orders agree to 1e-7.
+        for (found, expected) in found.multipliers().iter().zip(expected.multipliers()) {
+            if let (Some(found), Some(expected)) = (found, expected) {
+                let off = (found - expected).norm();
+                let size = expected.norm().max(1.0);
+                assert!(off <= 1e-5 * size, "{name}: {found} {expected}");
+            }
+        }
+    }
+}
