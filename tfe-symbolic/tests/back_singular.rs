@@ -29,7 +29,7 @@ fn close(found: f64, expected: f64, what: &str) {
 /// Value, first and second derivative of a potential of one coordinate, as many as are given.
 #[track_caller]
 fn check(energy: &str, parameters: &[(&str, f64)], x: f64, expected: &[f64]) {
-    let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
+    let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - ({energy})");
     let found = results_of(&text, parameters, ALL, &[x], &[0.0]);
     let found = [-found.value, -found.q[0], -found.qq[0][0]];
     for (found, expected) in found.into_iter().zip(expected) {
@@ -258,7 +258,7 @@ fn exponentials_of_poles() {
         ("exp(-1/x^2)", 1e-200),
         ("x*exp(-1/x^2)", 0.0),
         ("exp(-1/abs(x))", 0.0),
-        ("exp(-1/(3*abs(x)))*x", 0.0),
+        ("exp(-1/(3*abs(x)))", 0.0),
         (bump, 1.0),
         (bump, -1.0),
         (bump, 1.0 - 1e-9),
