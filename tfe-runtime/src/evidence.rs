@@ -224,9 +224,15 @@ fn energies<M, const N: usize>(model: &M, t: f64, state: &State<N>, v: &[f64; N]
 where
     M: Model<N>,
 {
-    let mut kinetic = 0.0;
-    for (p, v) in state.p.iter().zip(v) {
-        kinetic += 0.5 * p * v;
+    let energy = energy_at(model, t, &state.q, &state.p, v);
+    (energy, half_product(&state.p, v))
+}
+
+/// ½ p·v
+fn half_product<const N: usize>(p: &[f64; N], v: &[f64; N]) -> f64 {
+    let mut sum = 0.0;
+    for (p, v) in p.iter().zip(v) {
+        sum += 0.5 * p * v;
     }
-    (energy_at(model, t, &state.q, &state.p, v), kinetic)
+    sum
 }

@@ -170,43 +170,65 @@ where
         if !(largest(&state.q).is_finite() && largest(&state.p).is_finite()) {
             return Err(StepError::NonFinite);
         }
-        let scheme = self.tables.view();
-        let Some(last) = memory.last.filter(|last| last.end.is_same(state)) else {
-            parts.momenta.fill(state.p);
-            parts.unknowns.fill(0.0);
-            return Ok(false);
-        };
-        let fraction = continued_ratio(h / last.h);
-        if memory.ratio != Some(fraction) {
-            set_extrapolation(&scheme, fraction, parts.extrapolation);
-            memory.ratio = Some(fraction);
-        }
-        let unknowns = scheme.unknowns();
-        let halves = if const { M::CONSTRAINTS.is_empty() } {
-            parts.unknowns.len() / (unknowns * N)
-        } else {
-            1
-        };
-        for half in 0..halves {
-            let range = half * unknowns * N..(half + 1) * unknowns * N;
-            let old = parts.unknowns[range.clone()].as_chunks::<N>().0;
-            let new = parts.origin[range].as_chunks_mut::<N>().0;
-            for (row, weights) in new
-                .iter_mut()
-                .zip(parts.extrapolation.chunks_exact(unknowns))
-            {
-                *row = [0.0; N];
-                for (weight, old) in weights.iter().zip(old) {
-                    for a in 0..N {
-                        row[a] += weight * old[a];
-                    }
+        let is_free = const { M::CONSTRAINTS.is_empty() };
+        Ok(continue_last(
+            self.tables,
+            memory,
+            parts,
+            (h, state),
+            is_free,
+        ))
+    }
+}
+
+/// Extrapolates the unknowns of the last step if that has ended at `state`; otherwise they are set to zero, and the
+/// result is false. Without constraints, all unknowns are rates.
+fn continue_last<T, const N: usize>(
+    tables: &T,
+    memory: &mut Memory<N>,
+    parts: &mut Parts<'_, N>,
+    (h, state): (f64, &State<N>),
+    is_free: bool,
+) -> bool
+where
+    T: Tables,
+{
+    let Some(last) = memory.last.filter(|last| last.end.is_same(state)) else {
+        parts.momenta.fill(state.p);
+        parts.unknowns.fill(0.0);
+        return false;
+    };
+    let scheme = tables.view();
+    let fraction = continued_ratio(h / last.h);
+    if memory.ratio != Some(fraction) {
+        set_extrapolation(&scheme, fraction, parts.extrapolation);
+        memory.ratio = Some(fraction);
+    }
+    let unknowns = scheme.unknowns();
+    let halves = if is_free {
+        parts.unknowns.len() / (unknowns * N)
+    } else {
+        1
+    };
+    for half in 0..halves {
+        let range = half * unknowns * N..(half + 1) * unknowns * N;
+        let old = parts.unknowns[range.clone()].as_chunks::<N>().0;
+        let new = parts.origin[range].as_chunks_mut::<N>().0;
+        for (row, weights) in new
+            .iter_mut()
+            .zip(parts.extrapolation.chunks_exact(unknowns))
+        {
+            *row = [0.0; N];
+            for (weight, old) in weights.iter().zip(old) {
+                for a in 0..N {
+                    row[a] += weight * old[a];
                 }
             }
         }
-        let continued = halves * unknowns * N;
-        parts.unknowns[..continued].copy_from_slice(&parts.origin[..continued]);
-        Ok(true)
     }
+    let continued = halves * unknowns * N;
+    parts.unknowns[..continued].copy_from_slice(&parts.origin[..continued]);
+    true
 }
 
 /// Chooses between the iterations and between their initial guesses.
