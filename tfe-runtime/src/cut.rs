@@ -80,7 +80,7 @@ pub(crate) fn may_be_cut(error: &StepError, linear: bool, solve: Solve) -> bool 
 /// Moves `state` from t to t + h in two halves, which are halved again where necessary; false if even the shortest
 /// pieces fail.
 #[cold]
-pub(crate) fn in_halves<S: Halving>(
+pub(crate) fn in_halves<S: Halving + ?Sized>(
     stepper: &mut S,
     (t, h): (f64, f64),
     state: &mut S::State,

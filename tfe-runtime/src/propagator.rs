@@ -7,6 +7,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use crate::error::StepError;
 use crate::method::sum;
 use crate::model::State;
 use crate::real::Real;
@@ -42,10 +43,10 @@ pub(crate) struct Propagator<const N: usize> {
 
 impl<const N: usize> Propagator<N> {
     /// Builds the propagator from increments of steps; `step` gives the increment for a start.
-    pub(crate) fn of<E>(
+    pub(crate) fn of(
         h: f64,
-        mut step: impl FnMut(&State<N>) -> Result<State<N>, E>,
-    ) -> Result<Self, E> {
+        step: &mut dyn FnMut(&State<N>) -> Result<State<N>, StepError>,
+    ) -> Result<Self, StepError> {
         let mut columns = vec![0.0; 2 * N * (2 * N + 1)];
         let constant = step(&State::ZERO)?;
         let (far_p, far_q) = (far(&constant.p), far(&constant.q));

@@ -1,7 +1,9 @@
 //! A stepper that owns its memory.
 
 mod advance;
+mod any;
 mod carried;
+mod common;
 mod dense;
 mod matrices;
 mod over;

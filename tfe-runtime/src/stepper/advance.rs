@@ -1,12 +1,14 @@
 //! Steps of a stepper: ordinary ones, in halves, in arcs between kinks, by the matrix of a linear model.
 
-use super::piece::Piece;
+use super::any::AnyStepper;
+use super::common::Common;
 use super::setup::Stepper;
-use crate::cut::{Halving, Instant, in_halves, may_be_cut};
+use crate::constrained::trail::Of;
+use crate::cut::{Halving, Instant};
 use crate::dense::DenseElement;
 use crate::error::StepError;
 use crate::kinks::{Kinked, in_arcs, switches};
-use crate::method::{Impulse, Interval, Last, Memory, Method};
+use crate::method::{Impulse, Interval, Memory, Method};
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve};
 use crate::points::Together;
@@ -35,47 +37,22 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        self.carried.pieces.clear();
-        if Self::MAY_HAVE_KINKS && self.at_kinks && self.has_kinks(t, state) {
+        self.common.carried.pieces.clear();
+        if Self::MAY_HAVE_KINKS && self.common.at_kinks && self.has_kinks(t, state) {
             return self.advance_in_arcs(t, h, state, impulses);
         }
         if Self::HAS_CONSTRAINTS {
-            return self.advance_constrained(t, h, state, impulses);
+            return self.any().advance_constrained(t, h, state, impulses);
         }
-        self.advance_plainly(t, h, state, impulses)
+        match self.whole(t, h, state, impulses) {
+            Ok(()) => Ok(()),
+            Err(error) => self.any().divide(error, (t, h), state, impulses),
+        }
     }
 
-    /// A step without a search for kinks.
-    pub(super) fn advance_plainly(
-        &mut self,
-        t: f64,
-        h: f64,
-        state: &mut State<N>,
-        impulses: &[Impulse<N>],
-    ) -> Result<(), StepError> {
-        let Err(error) = self.whole(t, h, state, impulses) else {
-            return Ok(());
-        };
-        if !may_be_cut(&error, M::FACTS.linear, self.control.solve) {
-            // The workspace may not hold the previous step.
-            self.carried.memory.last = None;
-            return Err(error);
-        }
-        let (start, low, steps) = (
-            *state,
-            self.carried.memory.low,
-            self.carried.memory.statistics.steps,
-        );
-        let arrived = in_halves(self, (t, h), state, impulses, 1);
-        self.carried.memory.statistics.steps = steps;
-        if !arrived {
-            (*state, self.carried.memory.low, self.carried.memory.last) = (start, low, None);
-            self.carried.pieces.clear();
-            return Err(error);
-        }
-        self.carried.memory.statistics.steps += 1;
-        self.carried.memory.statistics.cuts += 1;
-        Ok(())
+    /// This stepper as one of any model.
+    fn any(&mut self) -> &mut (dyn AnyStepper<N> + '_) {
+        self
     }
 
     /// Whether kernels have branches that depend on a sign; if they have none, this is not evaluated again. At a start
@@ -85,10 +62,10 @@ where
         if !self.switches(t, state, &mut switches) {
             return false;
         }
-        self.at_kinks = !switches.is_empty();
+        self.common.at_kinks = !switches.is_empty();
         // Dense output is needed for every step.
-        self.carried.ends_only &= !self.at_kinks;
-        self.at_kinks
+        self.common.carried.ends_only &= !self.common.at_kinks;
+        self.common.at_kinks
     }
 
     #[cold]
@@ -99,93 +76,59 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        let (start, low, steps) = (
-            *state,
-            self.carried.memory.low,
-            self.carried.memory.statistics.steps,
-        );
+        let memory = &self.common.carried.memory;
+        let (start, low, steps) = (*state, memory.low, memory.statistics.steps);
         let outcome = in_arcs(self, (t, h), state, impulses);
         self.trust(false);
-        self.carried.memory.statistics.steps = steps + u64::from(outcome.is_ok());
+        let carried = &mut self.common.carried;
+        carried.memory.statistics.steps = steps + u64::from(outcome.is_ok());
         if outcome.is_err() {
-            (*state, self.carried.memory.low, self.carried.memory.last) = (start, low, None);
-            self.carried.pieces.clear();
+            (*state, carried.memory.low, carried.memory.last) = (start, low, None);
+            carried.pieces.clear();
         }
         outcome
     }
 
     /// Whether a propagator is to be used.
     fn is_propagated(&self) -> bool {
-        self.carried.ends_only && !matches!(self.control.solve, Solve::FixedPoint)
+        self.common.carried.ends_only && !matches!(self.common.control.solve, Solve::FixedPoint)
     }
 
     /// Moves `state` by the propagator of a linear model; false where an ordinary step is to be made.
     ///
     /// The propagator costs 2N + 1 steps: it is made after as many of the same length.
     fn propagate(&mut self, t: f64, h: f64, state: &mut State<N>) -> bool {
-        self.carried.alike = if self.carried.alike.0 == h {
-            (h, self.carried.alike.1.saturating_add(1))
-        } else {
-            (h, 1)
-        };
-        if self.carried.alike.1 <= 2 * N + 1 {
+        if !self.common.carried.is_alike(h) {
             return false;
         }
-        if !self
-            .carried
-            .propagator
-            .as_ref()
-            .is_some_and(|one| one.is_of(h))
-        {
-            let Ok(made) = Propagator::of(h, |start| self.increment(h, start)) else {
+        let known = &self.common.carried.propagator;
+        if !known.as_ref().is_some_and(|one| one.is_of(h)) {
+            let Ok(made) = Propagator::of(h, &mut |start| self.increment(h, start)) else {
                 return false;
             };
-            self.carried.propagator = Some(made);
+            self.common.carried.propagator = Some(made);
         }
-        let Some(propagator) = &self.carried.propagator else {
-            return false;
-        };
-        let start = *state;
-        let mut low = match &self.carried.memory.last {
-            Some(last) if last.end.is_same(&start) => self.carried.memory.low,
-            _ => State::ZERO,
-        };
-        let start_low = low;
-        if !propagator.advance(state, &mut low) {
-            // The ordinary step reports the reason.
-            return false;
-        }
-        self.carried.memory.last = Some(Last {
-            t,
-            h,
-            start,
-            start_low,
-            end: *state,
-        });
-        self.carried.memory.low = low;
-        self.carried.memory.statistics.steps += 1;
-        self.carried.memory.statistics.products += 1;
-        self.carried.skipped = true;
-        true
+        self.common.carried.propagate((t, h), state)
     }
 
     /// Moves `state` by the iteration with all points of the element at once.
     fn together(&mut self, t: f64, h: f64, state: &mut State<N>) -> Together {
-        let Some(points) = &mut self.carried.points else {
+        let carried = &mut self.common.carried;
+        let Some(points) = &mut carried.points else {
             return Together::LeftToOthers;
         };
-        let method = (&*self.model, &self.table, &self.control);
-        let outcome = points.step(method, &mut self.carried.memory, (t, h), state);
+        let method = (&*self.model, &self.common.table, &self.common.control);
+        let outcome = points.step(method, &mut carried.memory, (t, h), state);
         match outcome {
-            Together::Arrived if self.carried.ends_only => self.carried.skipped = true,
+            Together::Arrived if carried.ends_only => carried.skipped = true,
             Together::Arrived => {
                 self.write_back();
-                self.carried.skipped = false;
+                self.common.carried.skipped = false;
             }
             Together::LeftToOthers => {
                 // An ordinary step continues from what is in its workspace.
-                if self.carried.skipped && !self.write_back() {
-                    self.carried.memory.last = None;
+                if carried.skipped && !self.write_back() {
+                    self.common.carried.memory.last = None;
                 }
                 self.forget_points();
             }
@@ -196,7 +139,7 @@ where
 
     /// Makes the next step with all points at once start without continuing the last one.
     fn forget_points(&mut self) {
-        if let Some(points) = &mut self.carried.points {
+        if let Some(points) = &mut self.common.carried.points {
             points.forget();
         }
     }
@@ -206,16 +149,19 @@ where
         if !Self::MAY_HAVE_POINTS {
             return false;
         }
-        self.make_room();
-        let points = self.carried.points.as_mut();
-        points.is_some_and(|points| points.write_back::<M>(&self.table, &mut self.carried.numbers))
+        self.common.make_room();
+        let points = self.common.carried.points.as_mut();
+        points.is_some_and(|points| {
+            points.write_back::<M>(&self.common.table, &mut self.common.carried.numbers)
+        })
     }
 
     /// The increment of a state by an ordinary step, with its rounding error.
     fn increment(&self, h: f64, start: &State<N>) -> Result<State<N>, StepError> {
         let mut memory = Memory::new();
         let mut end = *start;
-        let (mut numbers, mut pivots) = (self.carried.numbers.clone(), self.carried.pivots.clone());
+        let carried = &self.common.carried;
+        let (mut numbers, mut pivots) = (carried.numbers.clone(), carried.pivots.clone());
         self.ordinary(&mut memory, (&mut numbers, &mut pivots), (0.0, h), &mut end)?;
         for a in 0..N {
             end.p[a] = (end.p[a] - start.p[a]) + memory.low.p[a];
@@ -234,10 +180,10 @@ where
     ) -> Result<(), StepError> {
         let method = Method {
             model: &*self.model,
-            tables: &self.table,
+            tables: &self.common.table,
             control: Control {
                 solve: Solve::Trusting,
-                ..self.control
+                ..self.common.control
             },
         };
         let interval = Interval {
@@ -264,9 +210,10 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        self.carried.impulses.clear();
-        self.carried.impulses.extend_from_slice(impulses);
-        self.is_of_points = false;
+        let given = &mut self.common.carried.impulses;
+        given.clear();
+        given.extend_from_slice(impulses);
+        self.common.is_of_points = false;
         if Self::MAY_BE_PROPAGATED
             && self.is_propagated()
             && impulses.is_empty()
@@ -277,7 +224,7 @@ where
         if Self::MAY_HAVE_POINTS && impulses.is_empty() && h.is_finite() && h != 0.0 {
             match self.together(t, h, state) {
                 Together::Arrived => {
-                    self.is_of_points = true;
+                    self.common.is_of_points = true;
                     return Ok(());
                 }
                 Together::Stalled(error) => return Err(error),
@@ -288,42 +235,43 @@ where
             // It continues from the workspace, which a step with all points at once has not filled.
             self.look_inside();
         }
-        self.carried.skipped = false;
-        self.make_room();
+        self.common.carried.skipped = false;
+        self.common.make_room();
         let interval = Interval {
             start: t,
             length: h,
             impulses,
         };
+        let carried = &mut self.common.carried;
         let workspace = Workspace {
-            numbers: &mut self.carried.numbers,
-            pivots: &mut self.carried.pivots,
+            numbers: &mut carried.numbers,
+            pivots: &mut carried.pivots,
         };
         let method = Method {
             model: &*self.model,
-            tables: &self.table,
-            control: self.control,
+            tables: &self.common.table,
+            control: self.common.control,
         };
-        method.advance(&mut self.carried.memory, workspace, interval, state)
+        method.advance(&mut carried.memory, workspace, interval, state)
     }
 
     fn passed(&mut self, t: f64, h: f64, kicks: Vec<Impulse<N>>) {
         self.look_inside();
-        debug_assert!(
-            !self.carried.skipped,
-            "steps of linear models have no pieces"
-        );
         let dense = self.dense_of_last(None, t, t + h);
-        if let Some(last) = self.carried.memory.last {
-            self.carried.pieces.push(Piece {
-                last,
-                impulses: kicks,
-                dense,
-                independence: self.carried.memory.independence,
-                numbers: self.carried.numbers.clone(),
-                pivots: self.carried.pivots.clone(),
-            });
-        }
+        self.common.keep_piece(dense, kicks);
+    }
+}
+
+impl<M, const N: usize> AnyStepper<N> for Stepper<'_, M, N>
+where
+    M: Model<N>,
+{
+    fn common(&mut self) -> &mut Common<N> {
+        &mut self.common
+    }
+
+    fn dimensions(&self) -> Of<'static> {
+        Of::model::<M, N>()
     }
 }
 
@@ -342,7 +290,7 @@ where
     }
 
     fn forget(&mut self) {
-        self.carried.memory.last = None;
+        self.common.carried.memory.last = None;
     }
 
     fn switches(&mut self, t: f64, state: &State<N>, values: &mut Vec<f64>) -> bool {
@@ -350,20 +298,20 @@ where
     }
 
     fn points(&self) -> (usize, bool) {
-        let scheme = self.table.view();
+        let scheme = self.common.table.view();
         (scheme.points(), scheme.has_ends())
     }
 
     fn crossed(&mut self) {
-        self.carried.memory.statistics.kinks += 1;
+        self.common.carried.memory.statistics.kinks += 1;
     }
 
     fn cuts(&self) -> bool {
-        self.solve.cuts()
+        self.common.solve.cuts()
     }
 
     fn trust(&mut self, all: bool) {
-        self.control.solve = self.solve.trusting(all);
+        self.common.control.solve = self.common.solve.trusting(all);
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::piece::{Ahead, Piece};
 use crate::dense::DenseElement;
-use crate::method::{Impulse, Memory};
+use crate::method::{Impulse, Last, Memory};
+use crate::model::State;
 use crate::points::Points;
 use crate::propagator::Propagator;
 use crate::registers::storage::Heap;
@@ -50,6 +51,51 @@ impl<const N: usize> Carried<N> {
             ahead: None,
             passes_node: false,
         }
+    }
+
+    /// Whether so many steps had this length that a propagator, which costs 2N + 1 steps, pays; counts the next one.
+    pub(super) fn is_alike(&mut self, h: f64) -> bool {
+        self.alike = if self.alike.0 == h {
+            (h, self.alike.1.saturating_add(1))
+        } else {
+            (h, 1)
+        };
+        self.alike.1 > 2 * N + 1
+    }
+
+    /// Moves `state` by the propagator; false where the end is not finite, for which the ordinary step reports the
+    /// reason.
+    pub(super) fn propagate(&mut self, (t, h): (f64, f64), state: &mut State<N>) -> bool {
+        let Some(propagator) = &self.propagator else {
+            return false;
+        };
+        let start = *state;
+        let mut low = match &self.memory.last {
+            Some(last) if last.end.is_same(&start) => self.memory.low,
+            _ => State::ZERO,
+        };
+        let start_low = low;
+        if !propagator.advance(state, &mut low) {
+            return false;
+        }
+        self.memory.last = Some(Last {
+            t,
+            h,
+            start,
+            start_low,
+            end: *state,
+        });
+        self.memory.low = low;
+        self.memory.statistics.steps += 1;
+        self.memory.statistics.products += 1;
+        self.skipped = true;
+        true
+    }
+
+    /// Time and state at the end of the last step.
+    pub(super) fn place(&self) -> (f64, State<N>) {
+        let last = self.memory.last;
+        last.map_or((0.0, State::ZERO), |last| (last.t + last.h, last.end))
     }
 
     /// The polynomials of a last step that was cut.

@@ -3,11 +3,10 @@
 use super::setup::Stepper;
 use crate::dense::DenseElement;
 use crate::error::StepError;
-use crate::method::{Interval, Memory, may_be_phase};
-use crate::model::{Model, State};
+use crate::method::Memory;
+use crate::model::Model;
 use crate::points::reach::{Reach, Weights};
 use crate::scheme::Tables;
-use crate::workspace::{interior_len, width};
 use alloc::vec::Vec;
 
 impl<M, const N: usize> Stepper<'_, M, N>
@@ -25,13 +24,14 @@ where
         if !(Self::MAY_HAVE_POINTS || Self::MAY_BE_PROPAGATED) {
             return Ok(None);
         }
-        let Some(last) = self.carried.memory.last.filter(|_| self.carried.skipped) else {
+        let carried = &self.common.carried;
+        let Some(last) = carried.memory.last.filter(|_| carried.skipped) else {
             return Ok(None);
         };
-        let (mut numbers, mut pivots) = self.room();
+        let (mut numbers, mut pivots) = self.common.room();
         if Self::MAY_HAVE_POINTS {
-            let kept = (self.carried.points.clone())
-                .is_some_and(|mut points| points.write_back::<M>(&self.table, &mut numbers));
+            let kept = (carried.points.clone())
+                .is_some_and(|mut points| points.write_back::<M>(&self.common.table, &mut numbers));
             debug_assert!(kept, "only steps with all points at once go past it");
             return if kept {
                 Ok(Some(numbers))
@@ -51,29 +51,28 @@ where
     #[must_use]
     #[inline(always)]
     pub fn reach(&mut self) -> Option<Reach<N>> {
-        if !(Self::MAY_HAVE_POINTS && self.is_of_points && self.carried.pieces.is_empty()) {
+        let is_whole = self.common.carried.pieces.is_empty();
+        if !(Self::MAY_HAVE_POINTS && self.common.is_of_points && is_whole) {
             return None;
         }
-        if self.weights.is_none() {
+        if self.common.weights.is_none() {
             self.weigh();
         }
-        let (points, last) = (
-            self.carried.points.as_ref()?,
-            self.carried.memory.last.as_ref()?,
-        );
-        let weights = self.weights.as_ref()?;
+        let carried = &self.common.carried;
+        let (points, last) = (carried.points.as_ref()?, carried.memory.last.as_ref()?);
+        let weights = self.common.weights.as_ref()?;
         points.reach::<M>(weights, last.h, &last.start)
     }
 
     #[cold]
     fn weigh(&mut self) {
-        self.weights = Some(Weights::of(&self.table.view()));
+        self.common.weights = Some(Weights::of(&self.common.table.view()));
     }
 
     /// Prepares dense output of the last step, where [`ends_only`](Self::ends_only) has omitted it.
     pub fn look_inside(&mut self) {
-        if self.carried.skipped && self.write_back() {
-            self.carried.skipped = false;
+        if self.common.carried.skipped && self.write_back() {
+            self.common.carried.skipped = false;
         }
     }
 
@@ -94,7 +93,7 @@ where
         start: f64,
         end: f64,
     ) -> DenseElement<N> {
-        match self.carried.dense_of_pieces(start, end) {
+        match self.common.carried.dense_of_pieces(start, end) {
             Some(dense) => dense,
             None => self.dense_of_last(spare, start, end),
         }
@@ -106,58 +105,12 @@ where
         start: f64,
         end: f64,
     ) -> DenseElement<N> {
-        let scheme = self.table.view();
-        let Some(last) = self.carried.memory.last else {
-            return DenseElement::constant(start, end, State::ZERO);
-        };
-        let Ok(retraced) = self.retrace() else {
-            return DenseElement::unknown(&scheme, (start, end), &last);
-        };
-        let numbers = retraced.as_ref().unwrap_or(&self.carried.numbers);
-        let (times, interval) = (
-            (start, end),
-            Interval {
-                start: last.t,
-                length: last.h,
-                impulses: &self.carried.impulses,
-            },
-        );
         if const { !M::CONSTRAINTS.is_empty() } {
-            let m = interior_len(&scheme.element, M::FORM, N, M::CONSTRAINTS.len());
-            let points = scheme.points() * N;
-            let momenta = &numbers[3 * m + points..3 * m + 2 * points];
-            let rates = &numbers[..scheme.unknowns() * N];
-            let (rates, momenta) = (rates.as_chunks().0, momenta.as_chunks().0);
-            // Constraints take up a part of impulses at the ends, which is distributed like their own impulses there.
-            let (mut start, mut end) = (last.start, last.end);
-            for impulse in interval.impulses {
-                let tau = interval.node_or_place(impulse);
-                let impulse = impulse.along(interval.length);
-                for a in 0..N {
-                    if tau == 0.0 {
-                        start.p[a] += impulse[a];
-                    } else if tau == 1.0 {
-                        end.p[a] -= impulse[a];
-                    }
-                }
-            }
-            let ends = (&start, &end);
-            let dense = DenseElement::constrained(&scheme, times, last.h, ends, rates, momenta);
-            return dense.ending_in(last.end);
+            return self.common.dense_with_constraints((start, end));
         }
-        // The workspace begins with the unknowns, their start and the increments.
-        let m = scheme.unknowns() * width(&scheme.element, M::FORM, N);
-        let unknowns = numbers[..m].as_chunks().0;
-        let (rates, forces) = if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form()
-        {
-            let (pi, kappa) = unknowns.split_at(scheme.points());
-            (kappa, pi)
-        } else {
-            (
-                unknowns,
-                numbers[3 * m..3 * m + scheme.points() * N].as_chunks().0,
-            )
-        };
-        DenseElement::of(&scheme, times, &last, rates, forces, &interval, spare)
+        let retraced = self.retrace();
+        let times = (start, end);
+        self.common
+            .dense_without_constraints(retraced, spare, times)
     }
 }

@@ -5,7 +5,7 @@ use crate::backwards::are_parameters;
 use crate::condense::{Direction, add_multiple};
 use crate::error::{ConstraintError, StepError, TransitionError};
 use crate::inside::{InsideLoss, InsideSlopes};
-use crate::method::{Impulse, Last, Memory, Method};
+use crate::method::{Impulse, Memory, Method};
 use crate::model::Model;
 use crate::scheme::{SchemeTable, Tables};
 use crate::workspace::{Workspace, linearised_len};
@@ -81,11 +81,11 @@ where
         matrix: &mut [f64],
         mut inside: Option<&mut Vec<InsideSlopes>>,
     ) -> Result<(), TransitionError> {
-        if self.carried.passes_node {
+        if self.common.carried.passes_node {
             // Where the rank of the constraints changes, the tangent of the motion is undetermined.
             return Err(StepError::from(ConstraintError::RankChanged).into());
         }
-        if self.carried.pieces.is_empty() && inside.is_none() {
+        if self.common.carried.pieces.is_empty() && inside.is_none() {
             return self.linearise_last(directions, matrix, None);
         }
         let width = 2 * N;
@@ -101,11 +101,11 @@ where
         }
         let (mut factor, mut next) = (vec![0.0; needed], vec![0.0; needed]);
         // The last piece leaves the stepper as the step has left it.
-        for piece in 0..self.carried.pieces.len().max(1) {
+        for piece in 0..self.common.carried.pieces.len().max(1) {
             let mut own = directions.to_vec();
-            if !self.carried.pieces.is_empty() {
-                own = self.of_piece(directions, piece);
-                self.recall(piece);
+            if !self.common.carried.pieces.is_empty() {
+                own = self.common.of_piece(directions, piece);
+                self.common.recall(piece);
             }
             let mut coefficients = Vec::new();
             let asked = inside.is_some().then_some(&mut coefficients);
@@ -120,7 +120,7 @@ where
                     coefficients,
                 });
             }
-            if self.carried.pieces.is_empty() {
+            if self.common.carried.pieces.is_empty() {
                 core::mem::swap(&mut product, &mut factor);
                 break;
             }
@@ -159,48 +159,24 @@ where
         lambda: &mut [f64],
         by_direction: &mut [f64],
     ) -> Result<(), TransitionError> {
-        if self.carried.passes_node {
+        if self.common.carried.passes_node {
             return Err(StepError::from(ConstraintError::RankChanged).into());
         }
-        let (needed, given) = (self.carried.pieces.len().max(1), inside.len());
+        let (needed, given) = (self.common.carried.pieces.len().max(1), inside.len());
         if !inside.is_empty() && given != needed {
             return Err(TransitionError::Shape { needed, given });
         }
-        if self.carried.pieces.is_empty() {
+        if self.common.carried.pieces.is_empty() {
             return self.adjoint_of_last(directions, inside.first(), lambda, by_direction);
         }
-        for piece in (0..self.carried.pieces.len()).rev() {
-            let own = self.of_piece(directions, piece);
-            self.recall(piece);
+        for piece in (0..self.common.carried.pieces.len()).rev() {
+            let own = self.common.of_piece(directions, piece);
+            self.common.recall(piece);
             self.adjoint_of_last(&own, inside.get(piece), lambda, by_direction)?;
         }
         // Returns the stepper to where the step has left it.
-        self.recall(self.carried.pieces.len() - 1);
+        self.common.recall(self.common.carried.pieces.len() - 1);
         Ok(())
-    }
-
-    /// The directions of a piece of the last step, as fractions of those of the whole step.
-    fn of_piece(&self, directions: &[Direction], piece: usize) -> Vec<Direction> {
-        let begin = self.carried.pieces[0].last.t;
-        let length: f64 = self.carried.pieces.iter().map(|piece| piece.last.h).sum();
-        let Last { t, h, .. } = self.carried.pieces[piece].last;
-        let own = |direction: &Direction| Direction {
-            time: direction.time + (t - begin) / length * direction.length,
-            length: h / length * direction.length,
-            ..*direction
-        };
-        directions.iter().map(own).collect()
-    }
-
-    /// Restores the stepper to the end of a piece of the last step.
-    fn recall(&mut self, piece: usize) {
-        let piece = &self.carried.pieces[piece];
-        self.carried.memory.last = Some(piece.last);
-        self.carried.memory.forget_workspace();
-        self.carried.numbers.clone_from(&piece.numbers);
-        self.carried.pivots.clone_from(&piece.pivots);
-        self.carried.impulses.clone_from(&piece.impulses);
-        self.carried.skipped = false;
     }
 
     fn linearise_last(
@@ -236,7 +212,7 @@ where
             add_start(inside, lambda);
             return Ok(());
         }
-        let mut backwards = self.backwards.take().unwrap_or_default();
+        let mut backwards = self.common.backwards.take().unwrap_or_default();
         backwards.begin(match directions {
             [] => 0,
             _ => self.model.parameters(),
@@ -249,7 +225,7 @@ where
             add_start(inside, lambda);
             backwards.add_to(&*self.model, directions, by_direction);
         }
-        self.backwards = Some(backwards);
+        self.common.backwards = Some(backwards);
         done
     }
 
@@ -265,36 +241,36 @@ where
             (&[Impulse<N>], &[Direction]),
         ) -> Result<(), TransitionError>,
     ) -> Result<(), TransitionError> {
-        let element = self.table.element();
+        let element = self.common.table.element();
         let constraints = M::CONSTRAINTS.len();
         let length = linearised_len(element, M::FORM, N, constraints, directions.len());
-        if self.extra.len() == length {
-            self.extra.fill(0.0);
+        if self.common.extra.len() == length {
+            self.common.extra.fill(0.0);
         } else {
-            self.extra = vec![0.0; length];
+            self.common.extra = vec![0.0; length];
         }
-        self.make_room();
+        self.common.make_room();
         self.look_inside();
         if let Some(numbers) = self.retrace()? {
-            self.carried.memory.forget_workspace();
-            self.carried.numbers = numbers;
-            self.carried.skipped = false;
+            self.common.carried.memory.forget_workspace();
+            self.common.carried.numbers = numbers;
+            self.common.carried.skipped = false;
         }
         let workspace = Workspace {
-            numbers: &mut self.carried.numbers,
-            pivots: &mut self.carried.pivots,
+            numbers: &mut self.common.carried.numbers,
+            pivots: &mut self.common.carried.pivots,
         };
         let method = Method {
             model: &*self.model,
-            tables: &self.table,
-            control: self.control,
+            tables: &self.common.table,
+            control: self.common.control,
         };
-        let given = (self.carried.impulses.as_slice(), directions);
+        let given = (self.common.carried.impulses.as_slice(), directions);
         differentiate(
             method,
-            &mut self.carried.memory,
+            &mut self.common.carried.memory,
             workspace,
-            &mut self.extra,
+            &mut self.common.extra,
             given,
         )
     }

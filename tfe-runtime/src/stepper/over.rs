@@ -1,15 +1,14 @@
 //! Steps over nodes at which constraints lose rank (T-120): the element at such a node ends beyond it.
 
+use super::any::AnyStepper;
+use super::common::Common;
 use super::piece::{Ahead, Piece};
-use super::setup::Stepper;
 use crate::constrained::rows::Independence;
-use crate::constrained::trail::Of;
-use crate::cut::{Halving, is_of_newton};
+use crate::cut::is_of_newton;
 use crate::error::{ConstraintError, StepError};
 use crate::method::Impulse;
-use crate::model::{Model, State};
+use crate::model::State;
 use crate::newton::Solve;
-use crate::scheme::Tables;
 use alloc::vec::Vec;
 
 /// How far before the node the element over it begins, as fractions of the step; they are tried one after the other.
@@ -48,10 +47,19 @@ fn is_of_the_place(error: &StepError) -> bool {
         )
 }
 
-impl<M, const N: usize> Stepper<'_, M, N>
-where
-    M: Model<N>,
-{
+impl<const N: usize> Common<N> {
+    /// Whether the constraints are much less independent at the end of the last step than at its start.
+    fn loses_rank(&self) -> bool {
+        let start = (self.carried.pieces.first())
+            .map_or(self.carried.memory.independence, |one| one.independence);
+        match (start, self.carried.memory.independence) {
+            (Some([start, _]), Some([_, end])) => is_lost(&start, &end),
+            _ => false,
+        }
+    }
+}
+
+impl<const N: usize> dyn AnyStepper<N> + '_ {
     /// A step of a model with constraints.
     pub(super) fn advance_constrained(
         &mut self,
@@ -60,48 +68,37 @@ where
         state: &mut State<N>,
         impulses: &[Impulse<N>],
     ) -> Result<(), StepError> {
-        self.carried.passes_node = false;
-        let ahead = self.carried.ahead.take().filter(|_| impulses.is_empty());
+        let of = self.dimensions();
+        let carried = &mut self.common().carried;
+        carried.passes_node = false;
+        let ahead = carried.ahead.take().filter(|_| impulses.is_empty());
         if let Some(ahead) = ahead.filter(|one| one.serves(t, h, state)) {
             return self.go_on(ahead, (t, h), state);
         }
-        let (foreseen, scheme) = (&mut self.foreseen, self.table.view());
-        self.carried.memory.is_foreseen = foreseen.take(
-            &scheme,
-            Of::model::<M, N>(),
-            (t, h),
-            &mut self.carried.numbers,
-        );
-        let (start, cuts) = (*state, self.carried.memory.statistics.cuts);
+        let common = self.common();
+        common.take_foreseen(of, (t, h));
+        let (start, cuts) = (*state, common.carried.memory.statistics.cuts);
         let outcome = self.advance_plainly(t, h, state, impulses);
-        if !(impulses.is_empty() && matches!(self.control.solve, Solve::Auto | Solve::Newton)) {
+        let solve = self.common().control.solve;
+        if !(impulses.is_empty() && matches!(solve, Solve::Auto | Solve::Newton)) {
             return outcome;
         }
         match outcome {
-            Ok(()) if self.loses_rank() => {
-                let done = self.clone();
+            Ok(()) if self.common().loses_rank() => {
+                let done = self.common().clone();
                 let mut moved = start;
-                self.carried.memory.statistics.cuts = cuts;
-                self.carried.memory.statistics.steps -= 1;
+                let statistics = &mut self.common().carried.memory.statistics;
+                statistics.cuts = cuts;
+                statistics.steps -= 1;
                 if self.over((t, h), &mut moved) {
                     *state = moved;
                 } else {
-                    *self = done;
+                    *self.common() = done;
                 }
                 Ok(())
             }
             Err(error) if is_of_the_place(&error) && self.over((t, h), state) => Ok(()),
             outcome => outcome,
-        }
-    }
-
-    /// Whether the constraints are much less independent at the end of the last step than at its start.
-    fn loses_rank(&self) -> bool {
-        let start = (self.carried.pieces.first())
-            .map_or(self.carried.memory.independence, |one| one.independence);
-        match (start, self.carried.memory.independence) {
-            (Some([start, _]), Some([_, end])) => is_lost(&start, &end),
-            _ => false,
         }
     }
 
@@ -120,11 +117,12 @@ where
             *state = start;
             return Err(error);
         }
-        if self.carried.pieces.is_empty() {
+        if self.common().carried.pieces.is_empty() {
             self.passed(ahead.t, rest, Vec::new());
         }
-        self.carried.pieces.insert(0, ahead.piece);
-        self.carried.passes_node = true;
+        let carried = &mut self.common().carried;
+        carried.pieces.insert(0, ahead.piece);
+        carried.passes_node = true;
         Ok(())
     }
 
@@ -132,26 +130,28 @@ where
     /// polynomial gives the state at the node. False, with nothing changed, if that fails.
     #[cold]
     fn over(&mut self, (t, h): (f64, f64), state: &mut State<N>) -> bool {
-        let (start, steps) = (*state, self.carried.memory.statistics.steps);
+        let (start, steps) = (*state, self.common().carried.memory.statistics.steps);
         let passes = REACHES
             .iter()
             .any(|reach| self.over_from((t, h), reach * h, state));
-        self.carried.memory.statistics.steps = steps;
+        let carried = &mut self.common().carried;
+        carried.memory.statistics.steps = steps;
         if !passes {
-            (*state, self.carried.memory.last) = (start, None);
-            self.carried.pieces.clear();
+            (*state, carried.memory.last) = (start, None);
+            carried.pieces.clear();
             return false;
         }
-        self.carried.memory.statistics.steps += 1;
-        self.carried.memory.statistics.cuts += 1;
-        self.carried.passes_node = true;
+        carried.memory.statistics.steps += 1;
+        carried.memory.statistics.cuts += 1;
+        carried.passes_node = true;
         true
     }
 
     fn over_from(&mut self, (t, h): (f64, f64), reach: f64, state: &mut State<N>) -> bool {
         let start = *state;
-        self.carried.pieces.clear();
-        self.carried.memory.last = None;
+        let carried = &mut self.common().carried;
+        carried.pieces.clear();
+        carried.memory.last = None;
         let (before, length) = (h - reach, reach + BEHIND * reach);
         let mut moved = start;
         if self.whole(t, before, &mut moved, &[]).is_err() {
@@ -164,17 +164,18 @@ where
         }
         let ends = begins + length;
         self.passed(begins, length, Vec::new());
-        let Some(mut piece) = self.carried.pieces.pop() else {
+        let carried = &mut self.common().carried;
+        let Some(mut piece) = carried.pieces.pop() else {
             return false;
         };
         let (to_node, from_node) = piece.dense.split(t + h);
         let node = to_node.at(1.0);
-        self.carried.pieces.push(Piece {
+        carried.pieces.push(Piece {
             dense: to_node,
             ..piece.clone()
         });
         piece.dense = from_node;
-        self.carried.ahead = Some(Ahead {
+        carried.ahead = Some(Ahead {
             node,
             t: ends,
             state: moved,

@@ -1,23 +1,17 @@
 //! The stepper that owns its memory, and its options.
 
 use super::carried::Carried;
-use crate::backwards::Backwards;
+use super::common::{Common, Shape};
 use crate::consistency::ModelError;
-use crate::constrained::Foreseen;
 use crate::element::Element;
 use crate::model::Model;
 use crate::newton::{Control, Solve};
 use crate::points::Points;
 use crate::points::forms::are_possible;
-use crate::points::reach::Weights;
 use crate::points::tables;
 use crate::scheme::{SchemeTable, Tables};
 use crate::share::Share;
 use crate::statistics::Statistics;
-use crate::workspace::{numbers_len, pivots_len};
-use alloc::boxed::Box;
-use alloc::vec;
-use alloc::vec::Vec;
 
 /// Steps a model with one element, on memory of its own.
 ///
@@ -65,23 +59,8 @@ use alloc::vec::Vec;
 #[derive(Debug)]
 pub struct Stepper<'m, M, const N: usize> {
     pub(super) model: Share<'m, M>,
-    pub(super) table: SchemeTable,
-    pub(super) control: Control,
-    pub(super) carried: Carried<N>,
-    /// The weights for the reach of a step, computed on first use.
-    pub(super) weights: Option<Weights>,
-    /// Whether the last step was made with all points at once.
-    pub(super) is_of_points: bool,
-    /// Whether steps are cut at kinks, if there are any.
-    pub(super) at_kinks: bool,
-    /// The requested kind of iteration; the one in use may accept more roots.
-    pub(super) solve: Solve,
-    /// The initial guess of the next step from another run of the same motion.
-    pub(super) foreseen: Foreseen,
-    /// The memory that derivatives of the last step need in addition to its workspace.
-    pub(super) extra: Vec<f64>,
-    /// The memory of the adjoint of elements, once it has been used.
-    pub(super) backwards: Option<Box<Backwards<N>>>,
+    /// All the rest.
+    pub(super) common: Common<N>,
 }
 
 // Not derived: the model is borrowed and need not be `Clone`.
@@ -89,16 +68,7 @@ impl<M, const N: usize> Clone for Stepper<'_, M, N> {
     fn clone(&self) -> Self {
         Self {
             model: self.model.clone(),
-            table: self.table.clone(),
-            control: self.control,
-            carried: self.carried.clone(),
-            weights: self.weights.clone(),
-            is_of_points: self.is_of_points,
-            at_kinks: self.at_kinks,
-            solve: self.solve,
-            foreseen: self.foreseen.clone(),
-            extra: Vec::new(),
-            backwards: None,
+            common: self.common.clone(),
         }
     }
 }
@@ -138,45 +108,17 @@ where
     ) -> Result<Self, ModelError> {
         model.check()?;
         let table = SchemeTable::new(element)?;
-        let scheme = table.view();
-        let is_possible = are_possible::<M, N>(&scheme.element) && control.solve != Solve::Newton;
-        let points = if Self::MAY_HAVE_POINTS && is_possible {
-            Points::new(&*model, tables::Tables::of(&scheme))
+        let points = if Self::MAY_HAVE_POINTS
+            && control.solve != Solve::Newton
+            && are_possible::<M, N>(&table.element())
+        {
+            Points::new(&*model, tables::Tables::of(&table.view()))
         } else {
             None
         };
-        let mut stepper = Self {
-            model,
-            table,
-            control,
-            carried: Carried::at_rest(points),
-            weights: None,
-            is_of_points: false,
-            at_kinks: false,
-            solve: control.solve,
-            foreseen: Foreseen::default(),
-            extra: Vec::new(),
-            backwards: None,
-        };
-        if stepper.carried.points.is_none() {
-            stepper.make_room();
-        }
-        Ok(stepper)
-    }
-
-    /// Allocates the tangent of an element on first use: it takes megabytes for thirty coordinates, and is not needed
-    /// while the fixed-point iteration contracts.
-    pub(super) fn make_room(&mut self) {
-        if self.carried.numbers.is_empty() {
-            (self.carried.numbers, self.carried.pivots) = self.room();
-        }
-    }
-
-    pub(super) fn room(&self) -> (Vec<f64>, Vec<usize>) {
-        let element = self.table.element();
-        let numbers = numbers_len(element, M::FORM, N, M::CONSTRAINTS.len());
-        let pivots = pivots_len(element, M::FORM, N, M::CONSTRAINTS.len());
-        (vec![0.0; numbers], vec![0; pivots])
+        let carried = Carried::at_rest(points);
+        let common = Common::new(Shape::of::<M, N>(), table, control, carried);
+        Ok(Self { model, common })
     }
 
     /// Continues with another model, about which nothing is known yet; the counts are kept.
@@ -184,20 +126,15 @@ where
     /// # Errors
     /// Only those of [`new`](Self::new).
     pub fn set_model(&mut self, model: Share<'m, M>) -> Result<(), ModelError> {
-        let control = Control {
-            solve: self.solve,
-            ..self.control
-        };
-        let mut other = Self::sharing(model, self.table.element(), control)?;
-        (other.carried.ends_only, other.at_kinks) = (self.carried.ends_only, self.at_kinks);
-        other.carried.memory.statistics = self.carried.memory.statistics;
-        *self = other;
+        let other = Self::sharing(model, self.element(), self.control())?;
+        self.model = other.model;
+        self.common.replaced_by(other.common);
         Ok(())
     }
 
     /// Changes the tolerance of the iterations from the next step on: [`Control::tolerance`].
     pub fn set_tolerance(&mut self, tolerance: f64) {
-        self.control.tolerance = tolerance;
+        self.common.control.tolerance = tolerance;
     }
 
     /// Declares that [`dense`](Self::dense) and [`transition`](Self::transition) will be called only now and then.
@@ -207,7 +144,7 @@ where
     /// then costs a step of its own.
     #[must_use]
     pub fn ends_only(mut self) -> Self {
-        self.carried.ends_only = true;
+        self.common.carried.ends_only = true;
         self
     }
 
@@ -215,26 +152,21 @@ where
     /// arguments of a `min` or `max` changes its sign, so that elements keep their order (T-119); [`Statistics::kinks`]
     /// counts the crossings. Models without such functions are stepped as before.
     #[must_use]
-    pub fn at_kinks(self) -> Self {
-        Self {
-            at_kinks: true,
-            ..self
-        }
+    pub fn at_kinks(mut self) -> Self {
+        self.common.at_kinks = true;
+        self
     }
 
     /// The element with which it steps.
     #[must_use]
     pub fn element(&self) -> Element {
-        self.table.element()
+        self.common.table.element()
     }
 
     /// The control of its iterations.
     #[must_use]
     pub fn control(&self) -> Control {
-        Control {
-            solve: self.solve,
-            ..self.control
-        }
+        self.common.control()
     }
 
     /// The model that is stepped.
@@ -246,11 +178,11 @@ where
     /// The cost of all steps so far.
     #[must_use]
     pub fn statistics(&self) -> &Statistics {
-        &self.carried.memory.statistics
+        &self.common.carried.memory.statistics
     }
 
     /// The counts since the last call.
     pub fn take_statistics(&mut self) -> Statistics {
-        core::mem::take(&mut self.carried.memory.statistics)
+        core::mem::take(&mut self.common.carried.memory.statistics)
     }
 }

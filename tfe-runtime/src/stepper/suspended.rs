@@ -1,9 +1,9 @@
 //! A suspended stepper: its memory without the model.
 
 use super::carried::Carried;
+use super::common::{Common, Shape};
 use super::setup::Stepper;
 use crate::consistency::ModelError;
-use crate::constrained::Foreseen;
 use crate::element::Element;
 use crate::model::{First, Model, Second, State};
 use crate::newton::Control;
@@ -31,8 +31,10 @@ fn tokens<M, const N: usize>(model: &M, (t, place): &(f64, State<N>)) -> Vec<u64
 where
     M: Model<N>,
 {
-    let bits = |index| model.parameter(index).to_bits();
-    let mut all: Vec<u64> = (0..model.parameters()).map(bits).collect();
+    let mut all = Vec::new();
+    for index in 0..model.parameters() {
+        all.push(model.parameter(index).to_bits());
+    }
     model.unnumbered(&mut |value| all.push(value));
     // Input functions, which models of this kind may have, are not called again.
     if !all.is_empty() || M::FACTS.time_dependent {
@@ -40,13 +42,18 @@ where
     }
     let (mut first, mut second) = (First::ZERO, Second::ZERO);
     model.second(*t, &place.q, &place.p, &mut first, &mut second);
+    bits_of(&first, &second)
+}
+
+/// The bits of first and second derivatives.
+fn bits_of<const N: usize>(first: &First<f64, N>, second: &Second<f64, N>) -> Vec<u64> {
     let Second {
         zz,
         zq,
         qq,
         force_z,
         force_q,
-    } = &second;
+    } = second;
     let matrices = [zz, zq, qq, force_z, force_q].into_iter().flatten();
     let rows = [&first.z, &first.q, &first.force].into_iter();
     let numbers = rows.chain(matrices).flatten();
@@ -59,6 +66,23 @@ where
 }
 
 impl<const N: usize> Suspended<N> {
+    fn of(common: Common<N>, place: (f64, State<N>), tokens: Vec<u64>) -> Self {
+        Self {
+            element: common.table.element(),
+            place,
+            tokens,
+            carried: common.carried,
+        }
+    }
+
+    /// The stepper, but for its model, with all counts zero.
+    fn resumed(self, shape: Shape, control: Control) -> Result<Common<N>, ModelError> {
+        let mut carried = self.carried;
+        carried.memory.statistics = Statistics::NONE;
+        let table = SchemeTable::new(self.element)?;
+        Ok(Common::new(shape, table, control, carried))
+    }
+
     /// The element of the stepper.
     #[must_use]
     pub fn element(&self) -> Element {
@@ -80,14 +104,9 @@ where
     /// Drops the model and keeps everything else.
     #[must_use]
     pub fn suspend(self) -> Suspended<N> {
-        let last = self.carried.memory.last;
-        let place = last.map_or((0.0, State::ZERO), |last| (last.t + last.h, last.end));
-        Suspended {
-            element: self.table.element(),
-            tokens: tokens(&*self.model, &place),
-            place,
-            carried: self.carried,
-        }
+        let place = self.common.carried.place();
+        let tokens = tokens(&*self.model, &place);
+        Suspended::of(self.common, place, tokens)
     }
 
     /// A stepper that continues where another one was [suspended](Self::suspend), with all counts zero. If that
@@ -104,21 +123,8 @@ where
         if !suspended.is_of(&*model) {
             return Self::sharing(model, suspended.element, control);
         }
-        let mut carried = suspended.carried;
-        carried.memory.statistics = Statistics::NONE;
-        Ok(Self {
-            model,
-            table: SchemeTable::new(suspended.element)?,
-            control,
-            carried,
-            weights: None,
-            is_of_points: false,
-            at_kinks: false,
-            solve: control.solve,
-            foreseen: Foreseen::default(),
-            extra: Vec::new(),
-            backwards: None,
-        })
+        let common = suspended.resumed(Shape::of::<M, N>(), control)?;
+        Ok(Self { model, common })
     }
 }
 

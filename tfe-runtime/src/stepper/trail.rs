@@ -1,5 +1,6 @@
 //! Exchange of initial guesses between runs of the same motion.
 
+use super::common::Common;
 use super::setup::Stepper;
 use crate::constrained::Trail;
 use crate::constrained::trail::Of;
@@ -14,25 +15,34 @@ where
     /// Adds the last step to a trail, for models with constraints and elements with Gauss points; a step that was cut
     /// is left out.
     pub fn leave(&self, trail: &mut Trail) {
-        if !Self::HAS_CONSTRAINTS {
-            return;
-        }
-        let scheme = self.table.view();
-        if let Some(last) = &self.carried.memory.last
-            && self.may_foresee()
-        {
-            let of = Of::model::<M, N>();
-            trail.push(&scheme, of, (last.t, last.h), &self.carried.numbers);
+        if Self::HAS_CONSTRAINTS {
+            self.common.leave(Of::model::<M, N>(), trail);
         }
     }
 
     /// Uses the solution of another run as initial guess of the step from t to t + h, if its trail reaches that far and
     /// the last step is continued.
     pub fn foresee(&mut self, trail: &Trail, (t, h): (f64, f64)) {
-        if Self::HAS_CONSTRAINTS && self.may_foresee() {
+        if Self::HAS_CONSTRAINTS {
+            self.common.foresee(Of::model::<M, N>(), trail, (t, h));
+        }
+    }
+}
+
+impl<const N: usize> Common<N> {
+    fn leave(&self, of: Of<'_>, trail: &mut Trail) {
+        if let Some(last) = &self.carried.memory.last
+            && self.may_foresee()
+        {
             let scheme = self.table.view();
-            self.foreseen
-                .look(trail, &scheme, Of::model::<M, N>(), (t, h));
+            trail.push(&scheme, of, (last.t, last.h), &self.carried.numbers);
+        }
+    }
+
+    fn foresee(&mut self, of: Of<'_>, trail: &Trail, step: (f64, f64)) {
+        if self.may_foresee() {
+            let scheme = self.table.view();
+            self.foreseen.look(trail, &scheme, of, step);
         }
     }
 
