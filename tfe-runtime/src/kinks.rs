@@ -13,6 +13,7 @@ use crate::error::StepError;
 use crate::model::{Form, Model};
 use alloc::vec::Vec;
 use search::{Crossing, begins_on_root, first_crossing};
+use watched::Origin;
 pub(crate) use watched::{Log, Watched};
 
 /// All arcs of a step together may take this many trials,
@@ -51,7 +52,7 @@ pub(crate) trait Kinked:
     fn inside(&self) -> Self::Inside;
 
     /// The state inside a step, or slightly beyond its end.
-    fn at(inside: &Self::Inside, tau: f64) -> Self::State;
+    fn at(&self, inside: &Self::Inside, tau: f64) -> Self::State;
 
     /// Makes the next step start without continuing the last polynomial.
     fn forget(&mut self);
@@ -94,18 +95,22 @@ where
         Form::Hamiltonian => state.p,
     };
     let log = Log::new(core::mem::take(values));
-    let watched = |value| Watched::new(value, &log);
     let mut first = crate::First::zero();
-    model.first(
-        watched(t),
-        &state.q.map(watched),
-        &z.map(watched),
-        &mut first,
-    );
-    let results = first.z.iter().chain(&first.q).chain(&first.force);
-    let origin = log.deciding(results);
+    let (q, z) = (watch(&state.q, &log), watch(&z, &log));
+    model.first(Watched::new(t, &log), &q, &z, &mut first);
+    let origin = deciding(&log, &first);
     *values = log.decisive(origin);
     true
+}
+
+/// The numbers, with a log of their comparisons.
+fn watch<'a, const N: usize>(numbers: &[f64; N], log: &'a Log) -> [Watched<'a>; N] {
+    numbers.map(|number| Watched::new(number, log))
+}
+
+/// The switching functions that have decided the derivatives of a model.
+fn deciding<const N: usize>(log: &Log, first: &crate::First<Watched<'_>, N>) -> Origin {
+    log.deciding(first.z.iter().chain(&first.q).chain(&first.force))
 }
 
 /// The trials that all arcs of a step have taken.
@@ -133,7 +138,7 @@ enum Arc {
 ///
 /// # Errors
 /// [`StepError`]; `state` is then the end of the last arc.
-pub(crate) fn in_arcs<S: Kinked>(
+pub(crate) fn in_arcs<S: Kinked + ?Sized>(
     stepper: &mut S,
     (t, h): (f64, f64),
     state: &mut S::State,
@@ -255,7 +260,7 @@ impl Landing {
 /// Lengths are tried until an arc ends at a root. Each trial that crosses a root tells where it is; each trial that
 /// ends before one gives an estimate from the slope there. Where the iteration for a long arc fails, because forces
 /// jump within it, a shorter arc is extended to the root.
-fn arc<S: Kinked>(
+fn arc<S: Kinked + ?Sized>(
     stepper: &mut S,
     (now, begins_at_root): (f64, bool),
     (end, rest, h): (f64, f64, f64),
@@ -325,7 +330,7 @@ fn arc<S: Kinked>(
         }
         let inside = stepper.inside();
         let mut values = |tau: f64, row: &mut Vec<f64>| {
-            let here = S::at(&inside, tau);
+            let here = stepper.at(&inside, tau);
             stepper.switches(now + tau * signed, &here, row);
         };
         // A root at the end of a step that has a point there: on which side it lies is decided by rounding.
@@ -426,7 +431,7 @@ fn arc<S: Kinked>(
 ///
 /// The polynomial of the arc is extended beyond the surface by a small part of the arc; a much smaller step from there
 /// tells how the motion continues on that side.
-fn slides<S: Kinked>(
+fn slides<S: Kinked + ?Sized>(
     stepper: &mut S,
     (time, length): (f64, f64),
     h: f64,
@@ -442,7 +447,7 @@ fn slides<S: Kinked>(
         stepper.switches(t, state, &mut row);
         row.get(switch).copied().unwrap_or(f64::NAN)
     };
-    let mut behind = S::at(&inside, 1.0 + BEYOND);
+    let mut behind = stepper.at(&inside, 1.0 + BEYOND);
     let (ahead, short) = (BEYOND * length, BEYOND * BEYOND * length);
     let before = value(stepper, time, state);
     let first = value(stepper, time + ahead, &behind);

@@ -17,6 +17,10 @@ use crate::scheme::Tables;
 use crate::workspace::Workspace;
 use alloc::vec::Vec;
 
+/// A stepper of any model whose forces have kinks.
+type AnyKinked<'a, const N: usize> = dyn 'a
+    + Kinked<State = State<N>, Kick = Impulse<N>, Kicks = Vec<Impulse<N>>, Inside = DenseElement<N>>;
+
 impl<M, const N: usize> Stepper<'_, M, N>
 where
     M: Model<N>,
@@ -78,7 +82,8 @@ where
     ) -> Result<(), StepError> {
         let memory = &self.common.carried.memory;
         let (start, low, steps) = (*state, memory.low, memory.statistics.steps);
-        let outcome = in_arcs(self, (t, h), state, impulses);
+        let any: &mut AnyKinked<'_, N> = self;
+        let outcome = in_arcs(any, (t, h), state, impulses);
         self.trust(false);
         let carried = &mut self.common.carried;
         carried.memory.statistics.steps = steps + u64::from(outcome.is_ok());
@@ -285,7 +290,7 @@ where
         self.dense_of_last(None, 0.0, 1.0)
     }
 
-    fn at(inside: &DenseElement<N>, tau: f64) -> State<N> {
+    fn at(&self, inside: &DenseElement<N>, tau: f64) -> State<N> {
         inside.at(tau)
     }
 

@@ -63,7 +63,7 @@ impl<M: Model> Kinked for Stepper<'_, M> {
         self.dense_of_last(0.0, 1.0)
     }
 
-    fn at(inside: &DenseElement, tau: f64) -> FamilyState {
+    fn at(&self, inside: &DenseElement, tau: f64) -> FamilyState {
         inside.at(tau)
     }
 
