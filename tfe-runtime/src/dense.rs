@@ -8,6 +8,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
+use crate::condense::add_multiple;
 use crate::method::{Interval, Last, rounding_of_times};
 use crate::model::State;
 use crate::quadrature::Quadrature;
@@ -161,37 +162,8 @@ impl<const N: usize> DenseElement<N> {
         let mut coefficients = vec![[0.0; N]; 2 * count].into_boxed_slice();
         let (q, p) = coefficients.split_at_mut(count);
         project(scheme.rate, rates, h, q);
-        // The Legendre coefficients of the momentum: the polynomial of degree s − 1 through the points, or the best
-        // approximation.
-        let mut values = vec![[0.0; N]; count + 1];
-        for ((node, weight), momentum) in scheme.nodes.iter().zip(scheme.weights).zip(momenta) {
-            let mut legendre_values = [0.0; MAX_NODES];
-            legendre(*node, &mut legendre_values);
-            for (m, value) in values.iter_mut().enumerate().take(count) {
-                for a in 0..N {
-                    value[a] += (2 * m + 1) as f64 * weight * legendre_values[m] * momentum[a];
-                }
-            }
-        }
-        for a in 0..N {
-            let (mut at_start, mut at_end, mut sign) = (start.p[a], end.p[a], 1.0);
-            for value in &values[..count] {
-                at_start -= sign * value[a];
-                at_end -= value[a];
-                sign = -sign;
-            }
-            // P_s(0) = sign, P_{s−1}(0) = −sign.
-            values[count][a] += 0.5 * (at_end + sign * at_start);
-            values[count - 1][a] += 0.5 * (at_end - sign * at_start);
-        }
-        // dP_n/dτ = 2 Σ (2k + 1) P_k over k = n − 1, n − 3, …
-        for (n, value) in values.iter().enumerate() {
-            for k in (0..n).rev().step_by(2) {
-                for a in 0..N {
-                    p[k][a] += 2.0 * (2 * k + 1) as f64 * value[a];
-                }
-            }
-        }
+        let ends = (start.p.as_slice(), end.p.as_slice());
+        add_momentum_rates(scheme, ends, momenta.as_flattened(), p.as_flattened_mut());
         Self {
             times,
             length: length(times, h),
@@ -236,26 +208,10 @@ impl<const N: usize> DenseElement<N> {
         (start, end): (State<N>, State<N>),
     ) -> Self {
         let (count, part) = (self.degree(), to - from);
-        let rule = Quadrature::gauss(count.max(1));
         let mut rates = vec![[0.0; N]; 2 * count].into_boxed_slice();
-        for point in 0..rule.len() {
-            let (mut here, mut whole) = ([0.0; MAX_NODES], [0.0; MAX_NODES]);
-            legendre(rule.node(point), &mut here);
-            legendre(from + part * rule.node(point), &mut whole);
-            for (new, old) in [(0..count, 0), (count..2 * count, count)] {
-                let mut value = [0.0; N];
-                for (m, weight) in whole.iter().take(count).enumerate() {
-                    for a in 0..N {
-                        value[a] += part * weight * self.rates[old + m][a];
-                    }
-                }
-                for (m, row) in rates[new].iter_mut().enumerate() {
-                    let weight = (2 * m + 1) as f64 * rule.weight(point) * here[m];
-                    for a in 0..N {
-                        row[a] += weight * value[a];
-                    }
-                }
-            }
+        for half in [0..count, count..2 * count] {
+            let old = self.rates[half.clone()].as_flattened();
+            add_part(N, old, (from, to), rates[half].as_flattened_mut());
         }
         Self {
             times,
@@ -373,6 +329,69 @@ pub(crate) fn piece_at<P>(
     let begun = |piece: &P| (start(piece) <= time) == (to >= from) || start(piece) == time;
     let after = pieces.partition_point(begun).checked_sub(1)?;
     pieces.get(after)
+}
+
+/// Adds the Legendre coefficients of dp/dτ for an element with constraints, from the momenta at its ends and at its
+/// points. Compiled once, for any number of coordinates.
+fn add_momentum_rates(
+    scheme: &SchemeRef<'_>,
+    (start, end): (&[f64], &[f64]),
+    momenta: &[f64],
+    rates: &mut [f64],
+) {
+    let (count, n) = (scheme.rates(), start.len());
+    let width = n.max(1);
+    // The Legendre coefficients of the momentum: the polynomial of degree s − 1 through the points, or the best
+    // approximation.
+    let mut values = vec![0.0; (count + 1) * n];
+    let momenta = momenta.chunks_exact(width);
+    for ((node, weight), momentum) in scheme.nodes.iter().zip(scheme.weights).zip(momenta) {
+        let mut legendre_values = [0.0; MAX_NODES];
+        legendre(*node, &mut legendre_values);
+        for (m, value) in values.chunks_exact_mut(width).enumerate().take(count) {
+            let factor = (2 * m + 1) as f64 * weight * legendre_values[m];
+            add_multiple(value, factor, momentum);
+        }
+    }
+    for a in 0..n {
+        let (mut at_start, mut at_end, mut sign) = (start[a], end[a], 1.0);
+        for value in values[..count * n].chunks_exact(width) {
+            at_start -= sign * value[a];
+            at_end -= value[a];
+            sign = -sign;
+        }
+        // P_s(0) = sign, P_{s−1}(0) = −sign.
+        values[count * n + a] += 0.5 * (at_end + sign * at_start);
+        values[(count - 1) * n + a] += 0.5 * (at_end - sign * at_start);
+    }
+    // dP_l/dτ = 2 Σ (2k + 1) P_k over k = l − 1, l − 3, …
+    for (l, value) in values.chunks_exact(width).enumerate() {
+        for k in (0..l).rev().step_by(2) {
+            let factor = 2.0 * (2 * k + 1) as f64;
+            add_multiple(&mut rates[k * n..(k + 1) * n], factor, value);
+        }
+    }
+}
+
+/// Adds the Legendre coefficients of the rates in a part of an element, from those in the whole, of n components each.
+fn add_part(n: usize, coefficients: &[f64], (from, to): (f64, f64), of_part: &mut [f64]) {
+    let width = n.max(1);
+    let (count, part) = (coefficients.len() / width, to - from);
+    let rule = Quadrature::gauss(count.max(1));
+    let mut value = vec![0.0; n];
+    for point in 0..rule.len() {
+        let (mut here, mut whole) = ([0.0; MAX_NODES], [0.0; MAX_NODES]);
+        legendre(rule.node(point), &mut here);
+        legendre(from + part * rule.node(point), &mut whole);
+        value.fill(0.0);
+        for (row, weight) in coefficients.chunks_exact(width).zip(whole) {
+            add_multiple(&mut value, part * weight, row);
+        }
+        for (m, row) in of_part.chunks_exact_mut(width).enumerate() {
+            let weight = (2 * m + 1) as f64 * rule.weight(point) * here[m];
+            add_multiple(row, weight, &value);
+        }
+    }
 }
 
 fn project<const N: usize>(
