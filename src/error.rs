@@ -279,6 +279,17 @@ impl<const N: usize, L: Length<N>> RunError<N, L> {
         }
     }
 
+    /// The result of a run: its motion, or why it failed, with the motion up to there.
+    pub(crate) fn unless_whole(
+        motion: Motion<N, L>,
+        failure: Option<RunErrorKind>,
+    ) -> Result<Motion<N, L>, Self> {
+        match failure {
+            None => Ok(motion),
+            Some(kind) => Err(Self::new(kind, motion)),
+        }
+    }
+
     /// The same error for a call that was made by another one; that one is named.
     pub(crate) fn of_call(mut self, made: &str, by: &'static str) -> Self {
         if let RunErrorKind::SetUnsupported { call }

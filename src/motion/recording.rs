@@ -1,7 +1,7 @@
 //! Motions as they are recorded: from their start, node by node.
 
 use super::arcs::Arcs;
-use super::{Checkpoint, Event, Motion, Node, Outputs, Setting, Warning};
+use super::{Checkpoint, Event, Motion, Node, Outputs, Reached, Seen, Setting, Warning};
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::evaluate::Evaluate;
 use crate::length::Length;
@@ -161,7 +161,16 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         self.warnings.push(warning);
     }
 
-    pub(crate) fn set_checkpoint(&mut self, checkpoint: Checkpoint<N, L>) {
+    /// Keeps what a continuation from the last node needs.
+    pub(crate) fn leave_checkpoint(&mut self, reached: Reached, stepper: L::Suspended, seen: Seen) {
+        let last = self.last();
+        let checkpoint = Checkpoint {
+            reached,
+            state: last.state(),
+            velocity: last.v.clone(),
+            stepper,
+            seen,
+        };
         self.checkpoint = Some(Box::new(checkpoint));
     }
 

@@ -9,6 +9,23 @@ use crate::motion::{Checkpoint, Motion, Node, Reached};
 use std::ops::Range;
 
 impl Reached {
+    /// The end of a run over a mesh with an origin, of which `done` elements were done at the end of the run before.
+    pub(super) fn after<const N: usize>(
+        before: Option<&Self>,
+        (mesh, done, origin): (&Mesh<N>, usize, f64),
+        step: Option<f64>,
+        time: f64,
+    ) -> Self {
+        match before {
+            // If there was nothing to do, the grid is that of the checkpoint.
+            Some(reached) if mesh.steps() == done => reached.clone(),
+            _ => {
+                let direction = before.map_or(0.0, |reached| reached.direction);
+                Self::new((origin, direction), step, mesh, time)
+            }
+        }
+    }
+
     /// The end of a run over a mesh with this origin; `before` is the direction of the run before, if the mesh is
     /// empty.
     pub(crate) fn new<const N: usize>(
@@ -18,7 +35,7 @@ impl Reached {
         time: f64,
     ) -> Self {
         let elements = mesh.steps();
-        let first = || mesh.elements().next().map(|(.., h)| h.abs());
+        let first = || mesh.first_step().map(f64::abs);
         Self {
             origin,
             step: step.or(mesh.step()).or_else(first),

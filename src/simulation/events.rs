@@ -38,30 +38,10 @@ pub struct Watched<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(super) value: Value<'m, L::Vector>,
 }
 
-/// [`Events::look`]; does nothing in a run without events.
-type Look<'m, M, const N: usize, L> = fn(
-    &mut Events<'m, M, N, L>,
-    &Passage<'_, N, L>,
-) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind>;
-
-/// [`Events::keep_off`]; does nothing in a run without events.
-type KeepOff<'m, M, const N: usize, L> =
-    fn(&mut Events<'m, M, N, L>, &mut <L as Length<N>>::Stepper<'m, M>, (f64, f64)) -> bool;
-
-/// [`Events::meet_due`]; does nothing in a run without events.
-type MeetDue<'m, M, const N: usize, L> = fn(
-    &mut Events<'m, M, N, L>,
-    f64,
-    &<L as Length<N>>::State,
-) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind>;
-
 /// The search for the events of a run.
 pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     model: Share<'m, M>,
     remodel: Option<Remodel<'m, M>>,
-    look: Look<'m, M, N, L>,
-    keep_off: KeepOff<'m, M, N, L>,
-    meet_due: MeetDue<'m, M, N, L>,
     watched: Vec<Watched<'m, N, L>>,
     pub(super) seen: Seen,
     /// Events at the time of the last cut, or missed before it, that are still to be met.
@@ -223,10 +203,6 @@ where
         self.clear.forget();
     }
 
-    pub(super) fn is_empty(&self) -> bool {
-        self.watched.is_empty()
-    }
-
     /// Begins a new step of the run.
     pub(super) fn begin(&mut self, step: f64) {
         (self.cuts, self.step) = (0, step);
@@ -239,10 +215,6 @@ where
         stepper: &mut L::Stepper<'m, M>,
         element: (f64, f64),
     ) -> bool {
-        (self.keep_off)(self, stepper, element)
-    }
-
-    fn keep_off(&mut self, stepper: &mut L::Stepper<'m, M>, element: (f64, f64)) -> bool {
         let within = |bounds: &[(f64, f64)]| M::reaches_within(stepper, bounds);
         (self.clear.holds(element, within) || self.look_about(stepper, element))
             && self.clear.agree(&mut self.seen.sides)
@@ -271,29 +243,16 @@ where
         )
     }
 
-    /// Applies the actions at the events in an element, in the order of time, up to the first that ends the element.
-    pub(super) fn pass(
-        &mut self,
-        arc: &Passage<'_, N, L>,
-    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
-        (self.look)(self, arc)
-    }
-
     /// Whether events at the time of the last cut are to be met before the run continues.
     pub(super) fn has_due(&self) -> bool {
         !self.due.is_empty()
     }
 
-    /// Applies the actions at these events, from the state that the last one has left, up to the first that cuts.
-    pub(super) fn pass_due(
+    /// Applies the actions at the events in an element, in the order of time, up to the first that ends the element.
+    pub(super) fn pass(
         &mut self,
-        time: f64,
-        state: &L::State,
+        arc: &Passage<'_, N, L>,
     ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
-        (self.meet_due)(self, time, state)
-    }
-
-    fn look(&mut self, arc: &Passage<'_, N, L>) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
         let Passage { t, h, dense, .. } = *arc;
         self.recorded.clear();
         if self.stays_off(dense) {

@@ -119,6 +119,11 @@ impl<const N: usize> Mesh<N> {
         self.times.elements().len()
     }
 
+    /// The length of the first element.
+    pub(crate) fn first_step(&self) -> Option<f64> {
+        self.elements().next().map(|(.., h)| h)
+    }
+
     /// Start, end and length of each element; see [`Times::elements`].
     pub(crate) fn elements(&self) -> Elements<'_> {
         self.times.elements()

@@ -6,11 +6,13 @@ use super::events::remodel::Changed;
 use super::events::{Cut, Events, Origin, Passage};
 use super::follow::{Follow, Passed};
 use super::kind::Simulated;
+use super::mesh::Mesh;
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use std::ops::ControlFlow;
 use tfe_runtime::Share;
 use tfe_runtime::step::Impulse;
+use tfe_runtime::transition::TransitionError;
 
 /// An element of the grid that is to be solved.
 #[derive(Clone, Copy)]
@@ -23,6 +25,35 @@ pub(super) struct Planned<'a, const N: usize> {
     /// The start, to the full digits of the step.
     pub(super) begin: f64,
     pub(super) impulses: &'a [Impulse<N>],
+}
+
+impl<const N: usize> Planned<'_, N> {
+    /// What a follower returned, as a result of the run: without a transition matrix it cannot follow further.
+    fn followed(&self, told: Result<(), TransitionError>) -> Result<(), RunErrorKind> {
+        told.map_err(|source| RunErrorKind::Transition {
+            element: self.number,
+            time: self.t,
+            step: self.h,
+            source,
+        })
+    }
+}
+
+/// The elements of a mesh, after those that are done.
+pub(super) fn planned<const N: usize>(
+    mesh: &Mesh<N>,
+    done: usize,
+) -> impl Iterator<Item = Planned<'_, N>> {
+    let count = mesh.steps();
+    let elements = mesh.elements().enumerate().skip(done);
+    elements.map(move |(number, (t, next, h))| Planned {
+        number,
+        t,
+        next,
+        h,
+        begin: mesh.begin(t, h),
+        impulses: mesh.impulses_in(t, next, number + 1 == count),
+    })
 }
 
 /// A piece that was solved and not cut by an event.
@@ -94,15 +125,52 @@ pub(super) struct Broken<const N: usize, L: Length<N> = FixedLength> {
     pub(super) piece: Option<(f64, f64, L::State)>,
 }
 
+impl<const N: usize, L: Length<N>> Broken<N, L> {
+    /// The failure of no known piece.
+    fn elsewhere(kind: RunErrorKind) -> Box<Self> {
+        Box::new(Self { kind, piece: None })
+    }
+
+    /// The failure of a piece, given by its start and length, and its initial state.
+    fn in_piece(kind: RunErrorKind, (start, h): (f64, f64), before: L::State) -> Box<Self> {
+        let piece = Some((start, h, before));
+        Box::new(Self { kind, piece })
+    }
+
+    /// How an element from `t` on was left; `None` stands for a user function that has panicked in it.
+    pub(super) fn unless_panicked(
+        passed: Option<Result<Left, Box<Self>>>,
+        t: f64,
+    ) -> Result<Left, Box<Self>> {
+        passed.unwrap_or_else(|| Err(Self::elsewhere(RunErrorKind::panicked(t))))
+    }
+}
+
+/// [`Pieces::pass_searching`]; called through a pointer, so that the search for events is only compiled for models that
+/// are used with events.
+pub(super) type Search<'m, M, const N: usize, L> = fn(
+    &mut Pieces<'m, M, N, L>,
+    &mut <L as Length<N>>::Stepper<'m, M>,
+    Planned<'_, N>,
+    &mut <L as Length<N>>::State,
+    &mut dyn Observe<'m, M, N, L>,
+) -> Result<Left, Box<Broken<N, L>>>;
+
+/// [`Simulated::exchange`]; called through a pointer for the same reason.
+type Exchange<'m, M, const N: usize, L> =
+    fn(&mut <L as Length<N>>::Stepper<'m, M>, Share<'m, M>) -> Result<(), RunErrorKind>;
+
 /// Solves elements and looks for events in them.
 pub(super) struct Pieces<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// The model with the parameters set by events so far.
     pub(super) model: Share<'m, M>,
     pub(super) events: Events<'m, M, N, L>,
+    /// `None` in a run without events.
+    search: Option<Search<'m, M, N, L>>,
     /// The memory of a polynomial that was not kept.
     spare: Option<L::Polynomial>,
-    /// Whether events have set parameters.
-    is_changed: bool,
+    /// Known once events have set parameters.
+    exchange: Option<Exchange<'m, M, N, L>>,
 }
 
 impl<'m, M, const N: usize, L> Pieces<'m, M, N, L>
@@ -110,18 +178,30 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    pub(super) fn new(model: Share<'m, M>, events: Events<'m, M, N, L>) -> Self {
+    pub(super) fn new(
+        model: Share<'m, M>,
+        events: Events<'m, M, N, L>,
+        search: Option<Search<'m, M, N, L>>,
+    ) -> Self {
         Self {
             model,
             events,
+            search,
             spare: None,
-            is_changed: false,
+            exchange: None,
         }
     }
 
-    /// Whether events have set parameters.
-    pub(super) fn is_changed(&self) -> bool {
-        self.is_changed
+    /// Gives a stepper the model of the start again, if events have set parameters.
+    pub(super) fn restore(
+        &self,
+        stepper: &mut L::Stepper<'m, M>,
+        model: &Share<'m, M>,
+    ) -> Result<(), RunErrorKind> {
+        match self.exchange {
+            Some(exchange) => exchange(stepper, model.clone()),
+            None => Ok(()),
+        }
     }
 
     /// Advances a state to the end of an element, or to the event that ends the run.
@@ -130,7 +210,93 @@ where
         stepper: &mut L::Stepper<'m, M>,
         planned: Planned<'_, N>,
         state: &mut L::State,
-        observer: &mut impl Observe<'m, M, N, L>,
+        observer: &mut dyn Observe<'m, M, N, L>,
+    ) -> Result<Left, Box<Broken<N, L>>> {
+        if let Some(search) = self.search {
+            return search(self, stepper, planned, state, observer);
+        }
+        let before = state.clone();
+        match self.pass_whole(stepper, &planned, &before, state, observer) {
+            Ok(()) => Ok(left(observer.reached(stepper, planned.next, state))),
+            Err(kind) => Err(Broken::in_piece(kind, (planned.t, planned.h), before)),
+        }
+    }
+
+    /// Advances a state to the end of an element in which no events are looked for.
+    fn pass_whole(
+        &mut self,
+        stepper: &mut L::Stepper<'m, M>,
+        planned: &Planned<'_, N>,
+        before: &L::State,
+        state: &mut L::State,
+        observer: &mut dyn Observe<'m, M, N, L>,
+    ) -> Result<(), RunErrorKind> {
+        self.advance(stepper, planned, state)?;
+        // Before the transition matrix is computed, which uses the same memory.
+        let dense = match observer.keeps() {
+            true => Some(self.inside(stepper, planned)),
+            false => None,
+        };
+        Self::tell(stepper, planned, (before, state), observer)?;
+        if let Some(dense) = dense {
+            observer.inside(dense);
+        }
+        Ok(())
+    }
+
+    /// Advances a state over a piece.
+    fn advance(
+        &self,
+        stepper: &mut L::Stepper<'m, M>,
+        piece: &Planned<'_, N>,
+        state: &mut L::State,
+    ) -> Result<(), RunErrorKind> {
+        let Planned { number, t, h, .. } = *piece;
+        M::advance(stepper, (piece.begin, h), state, piece.impulses)
+            .map_err(|source| self.model.failed(number, (t, h), source))
+    }
+
+    /// The polynomial of the piece that was solved last.
+    fn inside(&mut self, stepper: &mut L::Stepper<'m, M>, piece: &Planned<'_, N>) -> L::Polynomial {
+        M::inside(stepper, self.spare.take(), (piece.t, piece.next))
+    }
+
+    /// Tells the observer of a piece that was not cut, with the states at its ends.
+    fn tell(
+        stepper: &mut L::Stepper<'m, M>,
+        piece: &Planned<'_, N>,
+        (before, after): (&L::State, &L::State),
+        observer: &mut dyn Observe<'m, M, N, L>,
+    ) -> Result<(), RunErrorKind> {
+        let Planned { t, h, begin, .. } = *piece;
+        let passed = Passed {
+            start: t,
+            begin,
+            h,
+            before,
+            after,
+        };
+        piece.followed(observer.passed(stepper, &passed))?;
+        observer.whole(
+            stepper,
+            &Piece {
+                start: t,
+                h,
+                before,
+                after,
+                has_impulses: !piece.impulses.is_empty(),
+            },
+        );
+        Ok(())
+    }
+
+    /// Advances a state to the end of an element, or to the event that ends the run; looks for events.
+    pub(super) fn pass_searching(
+        &mut self,
+        stepper: &mut L::Stepper<'m, M>,
+        planned: Planned<'_, N>,
+        state: &mut L::State,
+        observer: &mut dyn Observe<'m, M, N, L>,
     ) -> Result<Left, Box<Broken<N, L>>> {
         let Planned { t, next, h, .. } = planned;
         self.events.begin(h);
@@ -138,7 +304,7 @@ where
         let (mut from, mut length) = (t, h);
         // The number of impulses that have acted. Those at the start act here, so that events see their effect; except
         // under constraints, which react to them inside the element.
-        let mut acted = match M::IS_CONSTRAINED || self.events.is_empty() {
+        let mut acted = match M::IS_CONSTRAINED {
             true => 0,
             false => self.model.kick_at(planned.impulses, (t, h), state),
         };
@@ -159,10 +325,10 @@ where
                 true => self.pass_due(piece, state, observer),
                 false => self.pass_piece(stepper, piece, state, observer),
             };
-            let cut = cut.map_err(|kind| Broken {
-                kind,
-                piece: Some((from, length, before)),
-            })?;
+            let cut = match cut {
+                Ok(cut) => cut,
+                Err(kind) => return Err(Broken::in_piece(kind, (from, length), before)),
+            };
             let Some(cut) = cut else {
                 if is_due && from != next {
                     continue;
@@ -196,7 +362,7 @@ where
             };
             let changed = model.map_or(Ok(()), |changed| self.change(stepper, observer, changed));
             let good = changed.and_then(|()| self.model.check_restart(time, length, &after));
-            good.map_err(|kind| Broken { kind, piece: None })?;
+            good.map_err(Broken::<N, L>::elsewhere)?;
             if time == next {
                 // Impulses at the end of the run have no later piece to act in.
                 acted = acted.max(acting::behind(planned.impulses, next, h));
@@ -220,28 +386,21 @@ where
         &mut self,
         piece: Planned<'_, N>,
         state: &L::State,
-        observer: &mut impl Observe<'m, M, N, L>,
+        observer: &mut dyn Observe<'m, M, N, L>,
     ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
-        let Planned { number, t, h, .. } = piece;
-        let cut = self.events.pass_due(t, state)?;
-        let no_matrix = |source| RunErrorKind::Transition {
-            element: number,
-            time: t,
-            step: h,
-            source,
-        };
+        let cut = self.events.meet_due(piece.t, state)?;
         let origin = || Origin::<N, L> {
-            t,
-            begin: t,
+            t: piece.t,
+            begin: piece.t,
             before: state,
             impulses: &[],
         };
         for severed in self.events.gone_by(origin()) {
-            observer.met(&severed).map_err(no_matrix)?;
+            piece.followed(observer.met(&severed))?;
         }
         if let Some(cut) = &cut {
             let severed = self.events.severed(&origin(), cut);
-            observer.cut(&severed).map_err(no_matrix)?;
+            piece.followed(observer.cut(&severed))?;
         }
         Ok(cut)
     }
@@ -252,67 +411,39 @@ where
         stepper: &mut L::Stepper<'m, M>,
         piece: Planned<'_, N>,
         state: &mut L::State,
-        observer: &mut impl Observe<'m, M, N, L>,
+        observer: &mut dyn Observe<'m, M, N, L>,
     ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
-        let Planned {
-            number,
-            t,
-            next,
-            h,
-            begin,
-            impulses,
-        } = piece;
+        let Planned { t, h, .. } = piece;
         let before = state.clone();
-        M::advance(stepper, (begin, h), state, impulses)
-            .map_err(|source| self.model.failed(number, (t, h), source))?;
+        self.advance(stepper, &piece, state)?;
         let keeps = observer.keeps();
-        let looks = !self.events.is_empty() && !self.events.stays_clear(stepper, (t, h));
+        let looks = !self.events.stays_clear(stepper, (t, h));
         // Before the transition matrix is computed, which uses the same memory.
-        let dense = (keeps || looks).then(|| M::inside(stepper, self.spare.take(), (t, next)));
-        let no_matrix = |source| RunErrorKind::Transition {
-            element: number,
-            time: t,
-            step: h,
-            source,
+        let dense = match keeps || looks {
+            true => Some(self.inside(stepper, &piece)),
+            false => None,
         };
         if let Some(dense) = dense.as_ref().filter(|_| looks) {
             let arc = Passage {
                 t,
-                begin,
+                begin: piece.begin,
                 h,
                 before: &before,
                 after: state,
                 dense,
-                impulses,
+                impulses: piece.impulses,
             };
             let cut = self.events.pass(&arc)?;
             for severed in self.events.gone_by(arc.origin()) {
-                observer.met(&severed).map_err(no_matrix)?;
+                piece.followed(observer.met(&severed))?;
             }
             if let Some(cut) = cut {
                 let severed = self.events.severed(&arc.origin(), &cut);
-                observer.cut(&severed).map_err(no_matrix)?;
+                piece.followed(observer.cut(&severed))?;
                 return Ok(Some(cut));
             }
         }
-        let passed = Passed {
-            start: t,
-            begin,
-            h,
-            before: &before,
-            after: state,
-        };
-        observer.passed(stepper, &passed).map_err(no_matrix)?;
-        observer.whole(
-            stepper,
-            &Piece {
-                start: t,
-                h,
-                before: &before,
-                after: state,
-                has_impulses: !impulses.is_empty(),
-            },
-        );
+        Self::tell(stepper, &piece, (&before, state), observer)?;
         match dense {
             Some(dense) if keeps => observer.inside(dense),
             Some(unneeded) => self.spare = Some(unneeded),
@@ -325,14 +456,15 @@ where
     fn change(
         &mut self,
         stepper: &mut L::Stepper<'m, M>,
-        observer: &mut impl Observe<'m, M, N, L>,
+        observer: &mut dyn Observe<'m, M, N, L>,
         (model, values): Changed<'m, M>,
     ) -> Result<(), RunErrorKind> {
         observer.set(&model)?;
         M::exchange(stepper, model.clone())?;
+        self.exchange = Some(M::exchange);
         self.events.set_model(model.clone());
         observer.changed(&model, &values);
-        (self.model, self.is_changed) = (model, true);
+        self.model = model;
         Ok(())
     }
 }

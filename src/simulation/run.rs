@@ -4,7 +4,7 @@ use super::events::Events;
 use super::follow::Follower;
 use super::kind::{Chosen, Simulated};
 use super::mesh::Mesh;
-use super::pieces::{Broken, Left, Pieces, Planned};
+use super::pieces::{Broken, Left, Pieces, Planned, planned};
 use super::progress;
 use super::recorder::Recorder;
 use super::setup::Simulation;
@@ -12,7 +12,8 @@ use super::steps::{Beginning, Steps};
 use super::times::Endless;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::Length;
-use crate::motion::{Checkpoint, Motion, Reached, Seen};
+use crate::motion::{Motion, Reached, Seen};
+use std::mem;
 use std::ops::Range;
 
 impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
@@ -66,7 +67,10 @@ where
     ) -> Result<Motion<N, L>, RunError<N, L>> {
         let prepared = self.model.guarded(|| {
             let mut prepared = self.prepare(&start, span);
-            let stepper = prepared.as_mut().ok().map(|(_, stepper)| stepper);
+            let stepper = match &mut prepared {
+                Ok((_, stepper)) => Some(stepper),
+                Err(_) => None,
+            };
             let motion = self.model.first_node((span.start, &start), stepper);
             (prepared, motion)
         });
@@ -95,29 +99,11 @@ where
         let mut seen = seen.unwrap_or_default();
         let place = (mesh, done, &mut seen);
         let mut motion = self.drive_from(motion, start, place, &mut stepper, follower)?;
-        if seen.has_stopped {
-            motion.set_stopped();
+        if goes_on(&mut motion, &seen) {
+            let time = motion.last().t;
+            let reached = Reached::after(before, (mesh, done, origin), self.step, time);
+            motion.leave_checkpoint(reached, M::suspended(stepper), seen);
         }
-        // A run that an event has stopped has no grid to continue on; one whose parameters were set would need another
-        // model.
-        if motion.is_stopped() || !motion.settings().is_empty() {
-            return Ok(motion);
-        }
-        let last = motion.last();
-        // If there was nothing to do, the grid is that of the checkpoint.
-        let same = before.filter(|_| mesh.steps() == done);
-        let direction = before.map_or(0.0, |reached| reached.direction);
-        let checkpoint = Checkpoint {
-            reached: match same {
-                Some(reached) => reached.clone(),
-                None => Reached::new((origin, direction), self.step, mesh, last.t),
-            },
-            state: last.state(),
-            velocity: last.v.clone(),
-            stepper: M::suspended(stepper),
-            seen,
-        };
-        motion.set_checkpoint(checkpoint);
         Ok(motion)
     }
 
@@ -153,32 +139,21 @@ where
         let mut state = start.clone();
         let mut bar = progress::Bar::new(self.progress, mesh.steps() - done);
         let mut failure = None;
-        for (number, (t, next, h)) in mesh.elements().enumerate().skip(done) {
+        for element in planned(mesh, done) {
+            let Planned { number, t, h, .. } = element;
             let is_last = number + 1 == mesh.steps();
-            let planned = Planned {
-                number,
-                t,
-                next,
-                h,
-                begin: mesh.begin(t, h),
-                impulses: mesh.impulses_in(t, next, is_last),
-            };
             let is_kicked = pieces.model.kick(&self.impulses, (t, h), &mut state);
-            let has_impulses = is_kicked || !planned.impulses.is_empty();
+            let has_impulses = is_kicked || !element.impulses.is_empty();
             recorder.begin(&*pieces.model, number, (t, h), &state, has_impulses);
             let passed = self.model.guarded(|| {
-                let left = pieces.pass(stepper, planned, &mut state, &mut recorder)?;
+                let left = pieces.pass(stepper, element, &mut state, &mut recorder)?;
                 if left == Left::Done {
                     let model = &*pieces.model;
-                    recorder.end(stepper, model, (number, is_last), (next, &state));
+                    recorder.end(stepper, model, (number, is_last), (element.next, &state));
                 }
                 Ok(left)
             });
-            let passed = passed.unwrap_or_else(|| {
-                let (kind, piece) = (RunErrorKind::panicked(t), None);
-                Err(Box::new(Broken { kind, piece }))
-            });
-            match passed {
+            match Broken::unless_panicked(passed, t) {
                 Ok(Left::Done) => {}
                 Ok(Left::Stopped) => {
                     pieces.events.seen.has_stopped = true;
@@ -193,17 +168,12 @@ where
             bar.advance();
         }
         let mut motion = recorder.into_motion(stepper, &state);
-        if pieces.is_changed()
-            && let Err(kind) = M::exchange(stepper, self.model.clone())
-        {
+        if let Err(kind) = pieces.restore(stepper, &self.model) {
             failure.get_or_insert(kind);
         }
-        *seen = pieces.events.seen;
-        motion.set_events(pieces.events.met);
-        match failure {
-            None => Ok(motion),
-            Some(kind) => Err(RunError::new(kind, motion)),
-        }
+        *seen = mem::take(&mut pieces.events.seen);
+        motion.set_events(mem::take(&mut pieces.events.met));
+        RunError::unless_whole(motion, failure)
     }
 
     /// The part that solves elements and looks for events.
@@ -218,7 +188,8 @@ where
             ..self.chosen()
         };
         let events = Events::new(self.model.clone(), &self.events, chosen)?;
-        Ok(Pieces::new(self.model.clone(), events))
+        let search = self.events.search();
+        Ok(Pieces::new(self.model.clone(), events, search))
     }
 
     /// Checks whether the run can begin at `start`.
@@ -237,7 +208,7 @@ where
     ) -> Result<(Mesh<N>, L::Stepper<'m, M>), RunErrorKind> {
         self.check_start(start)?;
         let mesh = self.mesh(span)?;
-        if let Some((_, _, h)) = mesh.elements().next() {
+        if let Some(h) = mesh.first_step() {
             self.model.check_first((span.start, h), start)?;
         }
         let mut stepper = M::stepper(self.model.clone(), self.chosen())?;
@@ -307,4 +278,13 @@ where
         let pieces = self.pieces(&stepper)?;
         Ok((stepper, elements, Some(pieces)))
     }
+}
+
+/// Whether a run can be continued from its end. One that an event has stopped has no grid to continue on; one whose
+/// parameters were set would need another model.
+fn goes_on<const N: usize, L: Length<N>>(motion: &mut Motion<N, L>, seen: &Seen) -> bool {
+    if seen.has_stopped {
+        motion.set_stopped();
+    }
+    !motion.is_stopped() && motion.settings().is_empty()
 }

@@ -94,7 +94,7 @@ where
     /// Solves the next element and looks for events in it; `None` after the end.
     pub(super) fn pass(
         &mut self,
-        observer: &mut impl Observe<'m, M, N, L>,
+        observer: &mut dyn Observe<'m, M, N, L>,
     ) -> Option<Result<(Left, f64), RunErrorKind>> {
         let Self {
             model,

@@ -304,7 +304,7 @@ where
 
     /// Meets the events that are due at the time of the last cut, in the state that it has left, up to the first that
     /// ends an element.
-    pub(super) fn meet_due(
+    pub(in crate::simulation) fn meet_due(
         &mut self,
         time: f64,
         state: &L::State,

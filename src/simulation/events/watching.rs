@@ -4,25 +4,24 @@ use super::act::{Act, Crossing, Occurrence, On};
 use super::clear::Clear;
 use super::remodel::{Remodel, remodel};
 use super::value::{Function, Value};
-use super::{Events, KeepOff, Look, MeetDue, Rooms, Watched};
+use super::{Events, Rooms, Watched};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::motion::Seen;
 use crate::simulation::kind::{Chosen, Simulated};
+use crate::simulation::pieces::{Pieces, Search};
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::Arc;
 use tfe_runtime::{CoordinateName, Share};
 
-/// The list of events of a run, with the functions that search for them.
+/// The list of events of a run, with the function that searches for them.
 pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     on: Vec<On<'m, N, L>>,
     /// Creates models with changed parameters, if an event can ask for it.
     remodel: Option<Remodel<'m, M>>,
-    /// The search itself; called through a pointer, so that it is only compiled for models that are used with events.
-    look: Look<'m, M, N, L>,
-    keep_off: KeepOff<'m, M, N, L>,
-    meet_due: MeetDue<'m, M, N, L>,
+    /// The search itself, if there are events.
+    search: Option<Search<'m, M, N, L>>,
 }
 
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Watching<'_, M, N, L> {
@@ -46,13 +45,15 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
     pub(crate) const NOTHING: Self = Self {
         on: Vec::new(),
         remodel: None,
-        look: |_, _| Ok(None),
-        keep_off: |_, _, _| false,
-        meet_due: |_, _, _| Ok(None),
+        search: None,
     };
 
     pub(crate) fn is_empty(&self) -> bool {
         self.on.is_empty()
+    }
+
+    pub(in crate::simulation) fn search(&self) -> Option<Search<'m, M, N, L>> {
+        self.search
     }
 
     /// Adds an event that sets no parameters.
@@ -61,8 +62,7 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
         M: Simulated<N, L>,
     {
         self.on.push(on);
-        (self.look, self.keep_off) = (Events::look, Events::keep_off);
-        self.meet_due = Events::meet_due;
+        self.search = Some(Pieces::pass_searching);
     }
 
     /// Adds an event before all others; it is the first of simultaneous events.
@@ -167,9 +167,6 @@ where
         Ok(Self {
             model,
             remodel: watching.remodel,
-            look: watching.look,
-            keep_off: watching.keep_off,
-            meet_due: watching.meet_due,
             seen: unseen(&watched),
             due: VecDeque::new(),
             watched,
