@@ -5,16 +5,21 @@ use super::kind::{Chosen, Simulated};
 use crate::length::Length;
 use crate::motion::Warning;
 use std::fmt;
-use tfe_runtime::{Share, Solve, Statistics};
+use tfe_runtime::{Element, Share, Solve, Statistics};
 
 /// Compares elements with three of a third of their length. Elements that were cut are compared with nine of a ninth:
 /// halves might be cut into the same pieces as the element.
 pub struct Resolution<'m, M: 'm, const N: usize, L: Length<N>> {
     again: Again<'m, M>,
-    /// The largest contraction ratio of an element that needs no comparison.
-    quick: f64,
     /// The stepper of comparisons; created when first needed.
     stepper: Option<L::Stepper<'m, M>>,
+    comparisons: Comparisons<N, L>,
+}
+
+/// The comparisons so far, and which elements are compared next.
+struct Comparisons<const N: usize, L: Length<N>> {
+    /// The largest contraction ratio of an element that needs no comparison.
+    quick: f64,
     doubtful: Sample,
     /// Counts those among the doubtful elements that were cut, which are compared first.
     cut: Sample,
@@ -32,7 +37,7 @@ pub struct Resolution<'m, M: 'm, const N: usize, L: Length<N>> {
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Resolution<'_, M, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Resolution")
-            .field("compared", &self.compared.len())
+            .field("compared", &self.comparisons.compared.len())
             .finish_non_exhaustive()
     }
 }
@@ -87,11 +92,85 @@ struct Compared<S> {
     off: S,
 }
 
+/// Advances a state over an element, given by start and length; returns false if it fails.
+type Advance<'a, S> = dyn FnMut((f64, f64), &mut S) -> bool + 'a;
+
 impl<'m, M, const N: usize, L> Resolution<'m, M, N, L>
 where
     M: Simulated<N, L> + 'm,
     L: Length<N>,
 {
+    pub(super) fn new(again: Again<'m, M>) -> Self {
+        Self {
+            comparisons: Comparisons::new(again.chosen.element),
+            again,
+            stepper: None,
+        }
+    }
+
+    /// Replaces the model.
+    pub(super) fn set_model(&mut self, model: Share<'m, M>) {
+        (self.again.model, self.stepper) = (model, None);
+    }
+
+    /// Compares the element if it is due. Linear models are skipped: the error of their elements is known.
+    #[inline(always)]
+    pub(super) fn look(&mut self, statistics: &Statistics, examined: Examined<'_, N, L>) {
+        if const { M::FACTS.linear } || self.again.chosen.control.solve == Solve::Trusting {
+            return;
+        }
+        if let Some(asked) = self.comparisons.asked(statistics, &examined) {
+            self.compare(asked, &examined);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn compare(&mut self, asked: Asked, examined: &Examined<'_, N, L>) {
+        let (again, stepper) = (&self.again, &mut self.stepper);
+        let mut advance = |element: (f64, f64), state: &mut L::State| {
+            Self::advance(again, stepper, element, state)
+        };
+        self.comparisons.compare(asked, examined, &mut advance);
+    }
+
+    /// Advances a state over an element with the stepper of comparisons. One that has failed is not used again.
+    fn advance(
+        again: &Again<'m, M>,
+        stepper: &mut Option<L::Stepper<'m, M>>,
+        element: (f64, f64),
+        state: &mut L::State,
+    ) -> bool {
+        if stepper.is_none() {
+            let Ok(made) = M::stepper(again.model.clone(), again.chosen) else {
+                return false;
+            };
+            *stepper = Some(M::ends_only(made));
+        }
+        let Some(made) = stepper else { return false };
+        let is_passed = M::advance(made, element, state, &[]).is_ok();
+        if !is_passed {
+            *stepper = None;
+        }
+        is_passed
+    }
+
+    /// The warning of a run whose last state is `last`, if elements do not resolve the motion.
+    pub(super) fn warning(&self, last: &L::State) -> Option<Warning> {
+        self.comparisons.warning(last)
+    }
+}
+
+/// A comparison that is to be made.
+#[derive(Clone, Copy)]
+struct Asked {
+    /// Whether the element itself is compared, and not only the continuation of the one before.
+    is_due: bool,
+    /// The number of shorter elements.
+    parts: u32,
+}
+
+impl<const N: usize, L: Length<N>> Comparisons<N, L> {
     /// The approximate relative error of an element from which on it is compared. A fixed-point iteration contracts by
     /// about (hω)²; the error of an element of order k is about (hω)ᵏ.
     const DOUBTFUL: f64 = 0.008;
@@ -106,11 +185,9 @@ where
     /// The number of elements passed for each comparison in such models.
     const ELEMENTS_A_COMPARISON: usize = 24;
 
-    pub(super) fn new(again: Again<'m, M>) -> Self {
+    fn new(element: Element) -> Self {
         Self {
-            quick: Self::DOUBTFUL.powf(2.0 / again.chosen.element.order() as f64),
-            again,
-            stepper: None,
+            quick: Self::DOUBTFUL.powf(2.0 / element.order() as f64),
             doubtful: Sample::default(),
             cut: Sample::default(),
             passed: 0,
@@ -121,32 +198,20 @@ where
         }
     }
 
-    /// Replaces the model.
-    pub(super) fn set_model(&mut self, model: Share<'m, M>) {
-        (self.again.model, self.stepper) = (model, None);
-    }
-
-    /// Compares the element if it is due. Linear models are skipped: the error of their elements is known.
-    #[inline(always)]
-    pub(super) fn look(&mut self, statistics: &Statistics, examined: Examined<'_, N, L>) {
-        if M::FACTS.linear || self.again.chosen.control.solve == Solve::Trusting {
-            return;
-        }
+    /// Counts an element; returns the comparison that it asks for.
+    fn asked(&mut self, statistics: &Statistics, examined: &Examined<'_, N, L>) -> Option<Asked> {
         // The contraction ratio of an element that was cut is that of its last piece.
         let work = (statistics.newton_iterations, statistics.cuts);
         let (by_newton_or_cut, is_cut) = (work != self.work, work.1 != self.work.1);
         self.work = work;
         self.passed += 1;
-        let is_due = self.is_due((by_newton_or_cut, is_cut), statistics, &examined);
-        if is_due || self.beside.is_some() {
-            // If an element was too long for its solution to be verified, a third of it may be, too.
-            let parts = if is_cut { 9 } else { 3 };
-            self.compare(is_due, parts, examined);
-        }
+        let is_due = self.is_due((by_newton_or_cut, is_cut), statistics, examined);
+        // If an element was too long for its solution to be verified, a third of it may be, too.
+        let parts = if is_cut { 9 } else { 3 };
+        (is_due || self.beside.is_some()).then_some(Asked { is_due, parts })
     }
 
     /// Whether the element is doubtful and selected.
-    #[inline(always)]
     fn is_due(
         &mut self,
         (by_newton_or_cut, is_cut): (bool, bool),
@@ -171,17 +236,20 @@ where
 
     /// Compares an element with shorter ones if it is due. After a compared element, the shorter elements are also
     /// continued over this one: this shows how the error of the previous element develops.
-    #[cold]
-    #[inline(never)]
-    fn compare(&mut self, is_due: bool, parts: u32, examined: Examined<'_, N, L>) {
+    fn compare(
+        &mut self,
+        Asked { is_due, parts }: Asked,
+        examined: &Examined<'_, N, L>,
+        advance: &mut Advance<'_, L::State>,
+    ) {
         // Not after an action, which changes the state.
         let continued = |beside: &Beside<L::State>| beside.run == *examined.before;
         if let Some(beside) = self.beside.take().filter(continued) {
-            self.compare_from(beside.state, parts, &examined);
+            self.compare_from(beside.state, parts, examined, advance);
         }
         if is_due {
             self.extend(examined.before);
-            let end = self.compare_from(examined.before.clone(), parts, &examined);
+            let end = self.compare_from(examined.before.clone(), parts, examined, advance);
             let run = examined.after.clone();
             self.beside = end.map(|state| Beside { state, run });
         }
@@ -193,9 +261,10 @@ where
         start: L::State,
         parts: u32,
         examined: &Examined<'_, N, L>,
+        advance: &mut Advance<'_, L::State>,
     ) -> Option<L::State> {
         let Examined { t, h, after, .. } = *examined;
-        let end = self.end_of_parts((t, h), parts, start);
+        let end = self.end_of_parts((t, h), parts, start, advance);
         let off = off::<N, L>(end.as_ref(), after);
         self.compared.push(Compared { t, h, off });
         end
@@ -207,18 +276,16 @@ where
         (t, h): (f64, f64),
         parts: u32,
         mut state: L::State,
+        advance: &mut Advance<'_, L::State>,
     ) -> Option<L::State> {
-        let mut stepper = match self.stepper.take() {
-            Some(stepper) => stepper,
-            None => M::ends_only(M::stepper(self.again.model.clone(), self.again.chosen).ok()?),
-        };
         let part = h / f64::from(parts);
         for k in 0..parts {
             let start = t + f64::from(k) * part;
-            M::advance(&mut stepper, (start, part), &mut state, &[]).ok()?;
+            if !advance((start, part), &mut state) {
+                return None;
+            }
             self.extend(&state);
         }
-        self.stepper = Some(stepper);
         Some(state)
     }
 
@@ -231,7 +298,7 @@ where
     }
 
     /// The warning of a run whose last state is `last`, if elements do not resolve the motion.
-    pub(super) fn warning(&self, last: &L::State) -> Option<Warning> {
+    fn warning(&self, last: &L::State) -> Option<Warning> {
         let [least, largest] = extended::<N, L>(self.bounds.as_ref()?, last);
         let extent = Extent::<N, L>::between(&least, &largest);
         let mut found = None;
