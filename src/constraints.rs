@@ -6,7 +6,7 @@
 
 pub(crate) mod allowed;
 
-use crate::numbers::row_of;
+use crate::numbers::{larger, row_of};
 use allowed::Held;
 use nalgebra::{DMatrix, DVector};
 use std::fmt;
@@ -115,6 +115,15 @@ pub struct ConstraintResidual {
     /// The smallest number of independent constraints at any node. For models of run-time length, whose constraints
     /// must all be independent, this is the number of constraints.
     pub rank: usize,
+}
+
+impl ConstraintResidual {
+    /// Includes the residual at another node.
+    pub(crate) fn include(&mut self, other: Self) {
+        self.position = larger(self.position, other.position);
+        self.velocity = larger(self.velocity, other.velocity);
+        self.rank = self.rank.min(other.rank);
+    }
 }
 
 /// The reactions (Lagrange multipliers) λ of the constraints at the recorded nodes. The reaction forces on the

@@ -26,6 +26,16 @@ impl Outputs {
         Some(values.step_by(self.names.len()).copied().collect())
     }
 
+    /// A row of zeros for a new node; `None` if the model has no outputs.
+    pub(super) fn new_row(&mut self) -> Option<&mut [f64]> {
+        let (columns, start) = (self.names.len(), self.values.len());
+        self.values.resize(start + columns, 0.0);
+        match columns {
+            0 => None,
+            _ => Some(&mut self.values[start..]),
+        }
+    }
+
     /// The values of all outputs at one recorded node, in the order of [`names`](Self::names); `None` if there is no
     /// such node and the model has outputs.
     pub fn row(&self, node: usize) -> Option<&[f64]> {

@@ -5,7 +5,6 @@ use super::{Checkpoint, Event, Motion, Node, Outputs, Reached, Seen, Setting, Wa
 use crate::constraints::{ConstraintResidual, Reactions};
 use crate::evaluate::Evaluate;
 use crate::length::Length;
-use crate::numbers::larger;
 use tfe_runtime::{CoordinateName, Statistics};
 
 impl<const N: usize, L: Length<N>> Motion<N, L> {
@@ -41,15 +40,19 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
 
     /// The same for a model that cannot be evaluated at the start.
     pub(crate) fn unknown<M: Evaluate<N, L>>(model: &M, t: f64, start: &L::State) -> Self {
-        let mut motion = Self::empty(model);
+        Self::empty(model).with_unknown(t, start)
+    }
+
+    /// A motion without nodes with a first one of which only the state is known.
+    fn with_unknown(mut self, t: f64, start: &L::State) -> Self {
         let (_, p) = L::parts(start);
         let v = L::unknown(p);
-        motion.nodes.push(Node::of(t, start, v.clone()));
-        motion.velocities.push(v);
-        motion.energies.push(f64::NAN);
-        motion.outputs.values = vec![f64::NAN; motion.outputs.names.len()];
-        motion.reactions.values = vec![f64::NAN; motion.reactions.names.len()];
-        motion
+        self.nodes.push(Node::of(t, start, v.clone()));
+        self.velocities.push(v);
+        self.energies.push(f64::NAN);
+        self.outputs.values = vec![f64::NAN; self.outputs.names.len()];
+        self.reactions.values = vec![f64::NAN; self.reactions.names.len()];
+        self
     }
 
     /// The start of a run that never began. The model is not evaluated, since its lengths or indices may not fit.
@@ -121,7 +124,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// The same if the velocity is known.
     #[inline(always)]
     pub(crate) fn record_node<M: Evaluate<N, L>>(&mut self, model: &M, node: Node<N, L>) {
-        let reactions = match M::IS_CONSTRAINED {
+        let reactions = match const { M::IS_CONSTRAINED } {
             true => model.reactions(node.t, (&node.q, &node.p), &node.v),
             false => Vec::new(),
         };
@@ -139,19 +142,11 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         let node = &self.nodes[place];
         let (t, at) = (node.t, (&node.q, &node.p));
         self.energies.push(model.energy(t, at, &node.v));
-        let columns = self.outputs.names.len();
-        if columns > 0 {
-            let start = self.outputs.values.len();
-            self.outputs.values.resize(start + columns, 0.0);
-            let values = &mut self.outputs.values[start..];
+        if let Some(values) = self.outputs.new_row() {
             model.outputs(t, at, &node.v, values);
         }
-        if M::IS_CONSTRAINED {
-            let residual = model.residual(t, &node.q, &node.v);
-            let largest = &mut self.residual;
-            largest.position = larger(largest.position, residual.position);
-            largest.velocity = larger(largest.velocity, residual.velocity);
-            largest.rank = largest.rank.min(residual.rank);
+        if const { M::IS_CONSTRAINED } {
+            self.residual.include(model.residual(t, &node.q, &node.v));
             self.reactions.values.extend(reactions);
         }
         self.velocities.push(node.v.clone());

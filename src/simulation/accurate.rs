@@ -95,29 +95,37 @@ fn accurate<R: Repeatable<N>, const N: usize>(
             };
             find(run, start, &given, None, (&mut kept, &mut work))
         }
-        (Steps::Equal, None) => find(run, start, asked, None, (&mut kept, &mut work)),
-        (Steps::Varying { damps }, None) => {
+        (Steps::Varying { damps }, None) if const { R::MAY_VARY } => {
             let mut explored = Statistics::NONE;
             let mut pilot = |first| graded(run, start, asked, damps, first, &mut explored);
             let found = find(run, start, asked, Some(&mut pilot), (&mut kept, &mut work));
             work.merge(&explored);
             found
         }
+        (_, None) => find(run, start, asked, None, (&mut kept, &mut work)),
     };
     let motion = match kept {
         Kept::Motion(motion) => motion,
         Kept::Nothing => run.part((t0, start), (t0, start)),
         Kept::Part(t, state) => run.part((t0, start), (t, &state)),
     };
-    let found = match outcome {
-        Ok(mut found) => {
-            found.picked.work = work;
-            found
-        }
+    concluded((outcome, work), motion, run.outputs(), wanted)
+}
+
+/// The result of a search: the motion with its errors, or why it has not the accuracy that is wanted.
+fn concluded<T>(
+    (outcome, work): (Result<Found, RunErrorKind>, Statistics),
+    motion: T,
+    outputs: Vec<String>,
+    wanted: f64,
+) -> Result<Estimated<T>, Broken<T>> {
+    let mut found = match outcome {
+        Ok(found) => found,
         Err(kind) => return Err(Box::new((kind, motion))),
     };
+    found.picked.work = work;
     let (times, errors) = (found.times, found.errors);
-    let estimated = Estimated::new(motion, times, errors, run.outputs(), Some(found.picked));
+    let estimated = Estimated::new(motion, times, errors, outputs, Some(found.picked));
     let is_possible = wanted >= ROUNDING;
     if found.is_met && is_possible {
         return Ok(estimated);

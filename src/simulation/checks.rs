@@ -3,7 +3,8 @@
 use crate::error::RunErrorKind;
 use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::family;
-use tfe_runtime::{Model, State};
+use tfe_runtime::step::Impulse;
+use tfe_runtime::{Form, Model, State};
 
 /// Whether energy is conserved by the model, so that a jump of it indicates too long a step. Linear models are
 /// excluded: their steps have another kind of error.
@@ -16,6 +17,11 @@ pub(crate) const fn conserves_energy<M: Model<N>, const N: usize>() -> bool {
 pub(crate) const fn conserves_energies<M: family::Model>() -> bool {
     let facts = M::FACTS;
     !(facts.time_dependent || facts.forced || facts.linear || M::CONSTRAINED)
+}
+
+/// Whether H may be linear in the momenta.
+pub(super) const fn may_be_of_first_order<M: Model<N>, const N: usize>() -> bool {
+    matches!(M::FORM, Form::Hamiltonian) && M::FACTS.quadratic_in_z
 }
 
 /// Refuses start values that are not finite.
@@ -31,6 +37,12 @@ pub(super) fn check_finite(q: &[f64], p: &[f64]) -> Result<(), RunErrorKind> {
         }
     }
     Ok(())
+}
+
+/// Refuses impulses of which one has a time or components that are not finite.
+pub(super) fn check_impulses<const N: usize>(impulses: &[Impulse<N>]) -> Result<(), RunErrorKind> {
+    let mut impulses = impulses.iter();
+    impulses.try_for_each(|one| check_impulse(one.time, &one.value))
 }
 
 /// Refuses an impulse with a time or components that are not finite.
@@ -56,7 +68,14 @@ pub(crate) fn check_constraints<M: Model<N>, const N: usize>(
         // A singular constraint is reported by the first element.
         return Ok(());
     };
-    let residuals = constrained::start_residuals(model, time, &start.q, &v, h);
+    check_residuals(
+        time,
+        constrained::start_residuals(model, time, &start.q, &v, h),
+    )
+}
+
+/// Refuses violations of the constraints at the start.
+fn check_residuals(time: f64, residuals: Vec<Residual>) -> Result<(), RunErrorKind> {
     let holds = |one: &Residual| one.relative() <= constrained::START_TOLERANCE;
     if residuals.iter().all(holds) {
         Ok(())

@@ -124,6 +124,13 @@ impl<const N: usize> Mesh<N> {
         self.elements().next().map(|(.., h)| h)
     }
 
+    /// The ends of the elements that a run from `start` passes after `last`.
+    pub(crate) fn ends_behind(&self, last: f64, start: f64) -> Vec<f64> {
+        let ends = self.elements().map(|(_, next, _)| next);
+        let is_ahead = |next: &f64| (next - last) * (next - start).signum() > 0.0;
+        ends.filter(is_ahead).collect()
+    }
+
     /// Start, end and length of each element; see [`Times::elements`].
     pub(crate) fn elements(&self) -> Elements<'_> {
         self.times.elements()

@@ -186,11 +186,10 @@ where
             graded: None,
             in_pairs: M::IS_CONSTRAINED && !run.has_events() && !run.crosses_kinks(),
         };
-        let mut facts = M::FACTS;
-        // First-order equations, written as p·f(q), have no structure that unequal steps would spoil.
-        facts.forced |= !facts.linear && run.model.is_of_first_order(span.start, start);
+        let is_of_first_order = !M::FACTS.linear && run.model.is_of_first_order(span.start, start);
         let are_equal = self.equal_steps || run.has_events();
-        let steps = Steps::of(&facts, are_equal, M::IS_CONSTRAINED);
+        let may_vary = Steps::may_vary(M::FACTS, is_of_first_order) && !are_equal;
+        let steps = Steps::of(may_vary, M::IS_CONSTRAINED);
         accurate(run, start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
     }
 
@@ -231,6 +230,8 @@ where
     type State = L::State;
     type Stepper = L::Stepper<'m, M>;
     type Motion = Motion<N, L>;
+
+    const MAY_VARY: bool = Steps::may_vary(M::FACTS, M::MAY_BE_OF_FIRST_ORDER);
 
     fn element(&self) -> Element {
         self.chosen_element()
@@ -371,9 +372,7 @@ where
         if goes_on.is_break() {
             return Ok(motion);
         }
-        let rest = mesh.elements().map(|(_, next, _)| next);
-        let ahead = rest.filter(|next| (next - last) * (next - t).signum() > 0.0);
-        let ahead: Vec<f64> = ahead.collect();
+        let ahead = mesh.ends_behind(last, t);
         if ahead.is_empty() {
             return Ok(motion);
         }

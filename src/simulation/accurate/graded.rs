@@ -78,11 +78,15 @@ pub(super) enum Steps {
 }
 
 impl Steps {
-    /// Equal steps preserve the structure of conservative autonomous models, and allow linear models to reuse one
-    /// matrix for all steps.
-    pub(super) fn of(facts: &Facts, are_equal: bool, is_constrained: bool) -> Self {
-        let may_vary = facts.time_dependent || (facts.forced && !facts.linear);
-        if may_vary && !are_equal {
+    /// Whether steps may vary. Equal steps preserve the structure of conservative autonomous models, and allow linear
+    /// models to reuse one matrix for all steps. First-order equations, written as p·f(q), have no structure that
+    /// unequal steps would spoil.
+    pub(super) const fn may_vary(facts: Facts, is_of_first_order: bool) -> bool {
+        facts.time_dependent || ((facts.forced || is_of_first_order) && !facts.linear)
+    }
+
+    pub(super) fn of(may_vary: bool, is_constrained: bool) -> Self {
+        if may_vary {
             Self::Varying {
                 damps: !is_constrained,
             }

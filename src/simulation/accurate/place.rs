@@ -59,8 +59,6 @@ fn is_passed<R: Repeatable<N>, const N: usize>(
     compares: bool,
 ) -> bool {
     const OTHER: f64 = 0.618;
-    /// The largest difference, relative to the largest number of the same kind, of two runs that agree.
-    const SAME: f64 = 0.1;
     let &RunErrorKind::Solve { time, step, .. } = kind else {
         return true;
     };
@@ -80,10 +78,13 @@ fn is_passed<R: Repeatable<N>, const N: usize>(
             Beyond::Unknown => return true,
         }
     }
-    if !compares {
-        return true;
-    }
-    let [one, other] = &rows;
+    !compares || agree(&trace, &rows)
+}
+
+/// Whether two runs have reached the same state, as rows of numbers.
+fn agree(trace: &Trace, [one, other]: &[Vec<f64>; 2]) -> bool {
+    /// The largest difference, relative to the largest number of the same kind, of two runs that agree.
+    const SAME: f64 = 0.1;
     let (mut apart, mut sizes) = (Vec::new(), Vec::new());
     trace.apart(one, other, &mut apart);
     trace.sizes_with(one, &mut sizes);

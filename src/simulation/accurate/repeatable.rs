@@ -24,6 +24,9 @@ pub(crate) trait Repeatable<const N: usize> {
     type Stepper;
     type Motion;
 
+    /// Whether the steps of a run with an accuracy may vary; if not, nothing that grades them is compiled.
+    const MAY_VARY: bool;
+
     /// The element; the default if none was chosen.
     fn element(&self) -> Element;
     fn control(&self) -> Control;

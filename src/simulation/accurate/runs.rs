@@ -199,12 +199,10 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
         let before = mem::take(&mut self.trail);
         let (mut trail, mut here) = (Trail::new(), Trail::new());
         let mut state = start.clone();
-        let mut times = Vec::new();
+        let mut shown = Shown::default();
         let mut failure = None;
         let mut goes_on = ControlFlow::Continue(());
-        let (mut apart, mut sizes) = (Vec::new(), Vec::new());
         let passed = self.record(&mut first.stepper, &mesh, &mut |stepper, at| {
-            let [one, other] = &mut watchers;
             // The second stepper makes the same step.
             let Some((element, (from, next, h))) = elements.next() else {
                 return ControlFlow::Continue(());
@@ -221,26 +219,14 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
             if let Some((_, (from, _, h))) = elements.peek() {
                 R::foresee(stepper, &before, (*from, *h));
             }
-            times.push(at.t);
+            let [one, other] = &mut watchers;
             one.pass(run, stepper, at, true);
             // Pairs are not used for runs with events, so the parameters are those of the given model.
             other.pass(run, &mut second.stepper, &run.at(at.t, &state), true);
-            other.trace.apart(&one.row, &other.row, &mut apart);
-            other.trace.sizes_with(&one.row, &mut sizes);
-            goes_on = judge(&Beside {
-                time: at.t,
-                apart: &apart,
-                sizes: &sizes,
-            });
+            goes_on = shown.judge(at.t, &watchers, judge);
             goes_on
         });
-        // The trail of an earlier pair is kept if it reaches farther.
-        let reach = |trail: &Trail| trail.end().map_or(0.0, |end| (end - t0).abs());
-        self.trail = if reach(&trail) > reach(&before) {
-            trail
-        } else {
-            before
-        };
+        self.trail = farther(trail, before, t0);
         self.keep_stepper(second);
         self.keep_stepper(first);
         let failed = passed.err().or(failure.map(Failed::from));
@@ -251,8 +237,46 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
         }
         Ok(RanBeside {
             traces: watchers.map(|watcher| watcher.trace),
-            times,
+            times: shown.times,
             is_complete: goes_on.is_continue(),
         })
+    }
+}
+
+/// What a judge is shown of two runs over the same steps.
+#[derive(Default)]
+struct Shown {
+    /// The times of the nodes.
+    times: Vec<f64>,
+    apart: Vec<f64>,
+    sizes: Vec<f64>,
+}
+
+impl Shown {
+    /// Compares the runs at a node that both have reached; the result says whether they continue.
+    fn judge(
+        &mut self,
+        time: f64,
+        [one, other]: &[Watcher; 2],
+        judge: &mut Judge<'_>,
+    ) -> ControlFlow<()> {
+        self.times.push(time);
+        other.trace.apart(&one.row, &other.row, &mut self.apart);
+        other.trace.sizes_with(&one.row, &mut self.sizes);
+        judge(&Beside {
+            time,
+            apart: &self.apart,
+            sizes: &self.sizes,
+        })
+    }
+}
+
+/// The trail of a pair of runs from `start`, or that of an earlier pair if that reaches as far.
+fn farther(trail: Trail, earlier: Trail, start: f64) -> Trail {
+    let reach = |trail: &Trail| trail.end().map_or(0.0, |end| (end - start).abs());
+    if reach(&trail) > reach(&earlier) {
+        trail
+    } else {
+        earlier
     }
 }

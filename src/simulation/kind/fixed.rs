@@ -1,6 +1,8 @@
 //! Runs of models of fixed size.
 
-use super::super::checks::{check_constraints, check_impulse, check_start, conserves_energy};
+use super::super::checks::{
+    check_constraints, check_impulses, check_start, conserves_energy, may_be_of_first_order,
+};
 use super::super::masses::mass_signs;
 use super::super::mesh::{Grid, Mesh, within};
 use super::super::watch::Watch;
@@ -16,8 +18,8 @@ use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper, Suspended};
 use tfe_runtime::{
-    CoordinateName, Element, Facts, First, Form, Model, ModelError, Second, Share, State,
-    Statistics, StepError,
+    CoordinateName, Element, Facts, First, Model, ModelError, Second, Share, State, Statistics,
+    StepError,
 };
 
 /// Creates a stepper; it cuts steps at kinks if asked to.
@@ -35,6 +37,7 @@ fn cutting<'m, M: Model<N>, const N: usize>(
 impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     const FACTS: Facts = M::FACTS;
     const MAY_ITERATE: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
+    const MAY_BE_OF_FIRST_ORDER: bool = may_be_of_first_order::<M, N>();
     const CONSERVES: bool = conserves_energy::<M, N>();
 
     fn coordinates(&self) -> usize {
@@ -46,12 +49,12 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     }
 
     fn is_of_first_order(&self, t: f64, start: &State<N>) -> bool {
-        let (mut first, mut second) = (First::ZERO, Second::ZERO);
-        let may_be = M::FORM == Form::Hamiltonian && M::FACTS.quadratic_in_z;
-        if may_be {
-            self.second(t, &start.q, &start.p, &mut first, &mut second);
+        if const { !may_be_of_first_order::<M, N>() } {
+            return false;
         }
-        may_be && second.zz.as_flattened().iter().all(|entry| *entry == 0.0)
+        let (mut first, mut second) = (First::ZERO, Second::ZERO);
+        self.second(t, &start.q, &start.p, &mut first, &mut second);
+        second.zz.as_flattened().iter().all(|entry| *entry == 0.0)
     }
 
     fn time_of(impulse: &Impulse<N>) -> f64 {
@@ -81,8 +84,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     fn check_start(&self, start: &State<N>, impulses: &[Impulse<N>]) -> Result<(), RunErrorKind> {
         self.check().map_err(RunErrorKind::Family)?;
         check_start(start)?;
-        let mut impulses = impulses.iter();
-        impulses.try_for_each(|one| check_impulse(one.time, &one.value))
+        check_impulses(impulses)
     }
 
     fn check_first(&self, (t, h): (f64, f64), start: &State<N>) -> Result<(), RunErrorKind> {
