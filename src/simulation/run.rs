@@ -153,7 +153,7 @@ where
                 }
                 Ok(left)
             });
-            match Broken::unless_panicked(passed, t) {
+            match Broken::<N, L>::unless_panicked(passed, t) {
                 Ok(Left::Done) => {}
                 Ok(Left::Stopped) => {
                     pieces.events.seen.has_stopped = true;
