@@ -8,7 +8,9 @@ use crate::statistics::Statistics;
 pub(crate) trait Equations {
     /// Whether only Newton's method solves them. It then starts from a continued polynomial, not from the result of a
     /// failed fixed-point iteration.
-    const BY_NEWTON_ALONE: bool = false;
+    fn is_by_newton_alone(&self) -> bool {
+        false
+    }
 
     /// The increment of the fixed-point iteration at x, which is not applied: the next iterate is x + `step`.
     ///

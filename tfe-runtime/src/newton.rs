@@ -395,17 +395,16 @@ pub(crate) enum Beginning {
 /// Simplified Newton iteration: the LU factors are kept while they contract well enough, also from step to step.
 ///
 /// Returns the evidence for the root. For linear equations the factors are always kept.
+///
+/// The equations are passed without their type, so that this is compiled once and not for every model.
 #[cfg_attr(not(feature = "alloc"), inline(never))] // small programs
-pub(crate) fn newton<E>(
-    equations: &mut E,
+pub(crate) fn newton(
+    equations: &mut dyn Equations,
     control: &Control,
     scratch: &mut Scratch<'_>,
     beginning: Beginning,
     linear: bool,
-) -> Result<Evidence, StepError>
-where
-    E: Equations,
-{
+) -> Result<Evidence, StepError> {
     let mut monitor = Monitor::new(control.tolerance);
     // Factoring a small matrix is cheaper than the additional iterations that old factors would need.
     let known = beginning == Beginning::Known && (linear || scratch.unknowns.len() >= SMALL);
@@ -414,7 +413,7 @@ where
     // Factoring a large matrix costs as much as many iterations with old factors.
     let is_large = scratch.unknowns.len() >= LARGE;
     let good_enough = if is_large { 0.3 } else { 0.05 };
-    let is_near = E::BY_NEWTON_ALONE && is_large && beginning == Beginning::Near;
+    let is_near = equations.is_by_newton_alone() && is_large && beginning == Beginning::Near;
     let mut uses = 0;
     let mut iterations = control.max_iterations;
     for iteration in 0..control.max_iterations {

@@ -439,7 +439,9 @@ impl<M, const N: usize> Equations for ConstrainedForm<'_, M, N>
 where
     M: Model<N>,
 {
-    const BY_NEWTON_ALONE: bool = true;
+    fn is_by_newton_alone(&self) -> bool {
+        true
+    }
 
     fn sweep(&mut self, _: &[f64], _: &mut [f64], _: bool) -> Result<(), StepError> {
         Err(ConstraintError::NeedsNewton.into())
