@@ -13,7 +13,7 @@
 use crate::dual::{Dual, duals};
 use crate::error::StepError;
 use crate::lu;
-use crate::model::{By, First, Form, Model, Second};
+use crate::model::{By, First, Model, Second};
 use crate::phase_form::PhaseForm;
 use crate::scheme::SchemeRef;
 use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm, add_row};
@@ -355,24 +355,21 @@ where
         }
         let node = self.scheme.nodes[l];
         let (mut of_momentum, mut of_force) = ([0.0; N], [0.0; N]);
-        match M::FORM {
-            Form::Lagrangian => {
-                let by = explicit(self.model, t, &q, &v, direction, node);
-                for a in 0..N {
-                    of_force[a] = by.q[a] + by.force[a];
-                    of_momentum[a] = by.z[a];
-                }
+        if const { M::FORM.is_lagrangian() } {
+            let by = explicit(self.model, t, &q, &v, direction, node);
+            for a in 0..N {
+                of_force[a] = by.q[a] + by.force[a];
+                of_momentum[a] = by.z[a];
             }
+        } else {
             // At fixed v the momentum moves: H_pp δp = −H_pa, and with it H_q and Q.
-            Form::Hamiltonian => {
-                let by = explicit(self.model, t, &q, &point.p, direction, node);
-                for a in 0..N {
-                    // The additional force is a function of v, which is held fixed.
-                    of_force[a] = by.force[a] - by.q[a] + self.span.damping * by.z[a];
-                    for b in 0..N {
-                        of_momentum[a] -= second.zz[a][b] * by.z[b];
-                        of_force[a] -= (second.zq[b][a] + second.force_z[a][b]) * by.z[b];
-                    }
+            let by = explicit(self.model, t, &q, &point.p, direction, node);
+            for a in 0..N {
+                // The additional force is a function of v, which is held fixed.
+                of_force[a] = by.force[a] - by.q[a] + self.span.damping * by.z[a];
+                for b in 0..N {
+                    of_momentum[a] -= second.zz[a][b] * by.z[b];
+                    of_force[a] -= (second.zq[b][a] + second.force_z[a][b]) * by.z[b];
                 }
             }
         }

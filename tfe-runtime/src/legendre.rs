@@ -14,7 +14,7 @@
 use crate::enclosure::Enclosure;
 use crate::error::LegendreError;
 use crate::lu::{Block, Singular};
-use crate::model::{First, Form, Model, Second, State};
+use crate::model::{First, Model, Second, State};
 
 /// A model at one instant, seen as a Lagrangian: `first.z` is L_v, `second.zq` is L_vq.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,9 +74,10 @@ pub fn momentum<M, const N: usize>(
 where
     M: Model<N>,
 {
-    match M::FORM {
-        Form::Lagrangian => finite(derivative(model, t, q, v)),
-        Form::Hamiltonian => conjugate(model, t, q, v, &[0.0; N]),
+    if const { M::FORM.is_lagrangian() } {
+        finite(derivative(model, t, q, v))
+    } else {
+        conjugate(model, t, q, v, &[0.0; N])
     }
 }
 
@@ -94,9 +95,10 @@ pub fn velocity<M, const N: usize>(
 where
     M: Model<N>,
 {
-    match M::FORM {
-        Form::Hamiltonian => finite(derivative(model, t, q, p)),
-        Form::Lagrangian => conjugate(model, t, q, p, guess),
+    if const { M::FORM.is_lagrangian() } {
+        conjugate(model, t, q, p, guess)
+    } else {
+        finite(derivative(model, t, q, p))
     }
 }
 
@@ -111,9 +113,10 @@ pub fn energy_at<M, const N: usize>(
 where
     M: Model<N>,
 {
-    match M::FORM {
-        Form::Hamiltonian => model.energy_function(t, q, p),
-        Form::Lagrangian => dot(p, v) - model.energy_function(t, q, v),
+    if const { M::FORM.is_lagrangian() } {
+        dot(p, v) - model.energy_function(t, q, v)
+    } else {
+        model.energy_function(t, q, p)
     }
 }
 
@@ -131,9 +134,10 @@ pub fn energy_rounding<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let z = match M::FORM {
-        Form::Hamiltonian => p,
-        Form::Lagrangian => v,
+    let z = if const { M::FORM.is_lagrangian() } {
+        v
+    } else {
+        p
     };
     let exactly = |x: f64| Enclosure::between(x, x);
     let bounds = model.energy_function(exactly(t), &q.map(exactly), &z.map(exactly));
@@ -154,9 +158,10 @@ pub fn force_rounding<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let z = match M::FORM {
-        Form::Hamiltonian => p,
-        Form::Lagrangian => v,
+    let z = if const { M::FORM.is_lagrangian() } {
+        v
+    } else {
+        p
     };
     let exactly = |x: f64| Enclosure::between(x, x);
     let mut first = First::<Enclosure, N>::zero();
@@ -178,12 +183,11 @@ pub fn energy<M, const N: usize>(
 where
     M: Model<N>,
 {
-    match M::FORM {
-        Form::Hamiltonian => Ok(model.energy_function(t, q, p)),
-        Form::Lagrangian => {
-            let v = conjugate(model, t, q, p, &[0.0; N])?;
-            Ok(energy_at(model, t, q, p, &v))
-        }
+    if const { M::FORM.is_lagrangian() } {
+        let v = conjugate(model, t, q, p, &[0.0; N])?;
+        Ok(energy_at(model, t, q, p, &v))
+    } else {
+        Ok(model.energy_function(t, q, p))
     }
 }
 
@@ -215,29 +219,26 @@ where
     M: Model<N>,
 {
     let (mut first, mut second) = (First::ZERO, Second::ZERO);
-    match M::FORM {
-        Form::Lagrangian => {
-            model.second(t, q, v, &mut first, &mut second);
-            let lagrangian = model.energy_function(t, q, v);
-            Ok(LagrangianView {
-                p: first.z,
-                lagrangian,
-                first,
-                second,
-            })
-        }
-        Form::Hamiltonian => {
-            let p = conjugate(model, t, q, v, guess)?;
-            model.second(t, q, &p, &mut first, &mut second);
-            let lagrangian = dot(&p, v) - model.energy_function(t, q, &p);
-            let (first, second) = transform(&p, &first, &second)?;
-            Ok(LagrangianView {
-                p,
-                lagrangian,
-                first,
-                second,
-            })
-        }
+    if const { M::FORM.is_lagrangian() } {
+        model.second(t, q, v, &mut first, &mut second);
+        let lagrangian = model.energy_function(t, q, v);
+        Ok(LagrangianView {
+            p: first.z,
+            lagrangian,
+            first,
+            second,
+        })
+    } else {
+        let p = conjugate(model, t, q, v, guess)?;
+        model.second(t, q, &p, &mut first, &mut second);
+        let lagrangian = dot(&p, v) - model.energy_function(t, q, &p);
+        let (first, second) = transform(&p, &first, &second)?;
+        Ok(LagrangianView {
+            p,
+            lagrangian,
+            first,
+            second,
+        })
     }
 }
 
@@ -255,29 +256,26 @@ where
     M: Model<N>,
 {
     let (mut first, mut second) = (First::ZERO, Second::ZERO);
-    match M::FORM {
-        Form::Hamiltonian => {
-            model.second(t, q, p, &mut first, &mut second);
-            let hamiltonian = model.energy_function(t, q, p);
-            Ok(HamiltonianView {
-                v: first.z,
-                hamiltonian,
-                first,
-                second,
-            })
-        }
-        Form::Lagrangian => {
-            let v = conjugate(model, t, q, p, &[0.0; N])?;
-            model.second(t, q, &v, &mut first, &mut second);
-            let hamiltonian = dot(p, &v) - model.energy_function(t, q, &v);
-            let (first, second) = transform(&v, &first, &second)?;
-            Ok(HamiltonianView {
-                v,
-                hamiltonian,
-                first,
-                second,
-            })
-        }
+    if const { M::FORM.is_lagrangian() } {
+        let v = conjugate(model, t, q, p, &[0.0; N])?;
+        model.second(t, q, &v, &mut first, &mut second);
+        let hamiltonian = dot(p, &v) - model.energy_function(t, q, &v);
+        let (first, second) = transform(&v, &first, &second)?;
+        Ok(HamiltonianView {
+            v,
+            hamiltonian,
+            first,
+            second,
+        })
+    } else {
+        model.second(t, q, p, &mut first, &mut second);
+        let hamiltonian = model.energy_function(t, q, p);
+        Ok(HamiltonianView {
+            v: first.z,
+            hamiltonian,
+            first,
+            second,
+        })
     }
 }
 
@@ -378,10 +376,12 @@ where
         if largest(&step) <= enough * largest(&z) {
             return finite(z);
         }
+        if const { M::FACTS.quadratic_in_z } {
+            continue;
+        }
         // Damped Newton steps, for functions such as −m√(1 − v²) that are undefined where a full step may lead.
         let mut fraction = 1.0;
-        while !M::FACTS.quadratic_in_z
-            && residual > 1e-8 * scale
+        while residual > 1e-8 * scale
             && fraction > 1e-6
             && !improves(distance(&derivative(model, t, q, &z), target), residual)
         {

@@ -91,6 +91,13 @@ pub enum Form {
     Hamiltonian,
 }
 
+impl Form {
+    /// Whether it is L(q, v, t). In `if const { … }` a model is compiled for its own form alone.
+    pub(crate) const fn is_lagrangian(self) -> bool {
+        matches!(self, Self::Lagrangian)
+    }
+}
+
 /// Structural facts about a model that the macro has determined; they allow the runtime cheaper algorithms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facts {

@@ -11,7 +11,7 @@ use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::{LegendreError, StepError};
 use crate::legendre::{conjugate, lagrangian_view_from};
 use crate::lu::{Block, factor_block, solve};
-use crate::model::{First, Form, Model, Second};
+use crate::model::{First, Model, Second};
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 
@@ -116,31 +116,28 @@ where
         let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
         for l in 0..points {
             let (t, q, v) = self.place(l, rates);
-            let p = match M::FORM {
-                Form::Lagrangian => {
-                    if with_masses {
-                        self.model.first_and_mass(t, &q, &v, &mut first, &mut zz);
-                    } else {
-                        self.model.first(t, &q, &v, &mut first);
-                    }
-                    for a in 0..N {
-                        self.forces[l][a] = first.q[a] + first.force[a];
-                    }
-                    first.z
+            let p = if const { M::FORM.is_lagrangian() } {
+                if with_masses {
+                    self.model.first_and_mass(t, &q, &v, &mut first, &mut zz);
+                } else {
+                    self.model.first(t, &q, &v, &mut first);
                 }
-                Form::Hamiltonian => {
-                    let p = conjugate(self.model, t, &q, &v, &self.momenta[l])?;
-                    self.model.first_and_mass(t, &q, &p, &mut first, &mut zz);
-                    if with_masses {
-                        let inverse = Block::of(&zz).map_err(singular)?.inverse();
-                        zz = inverse;
-                    }
-                    for a in 0..N {
-                        self.forces[l][a] = first.force[a] - first.q[a];
-                    }
-                    self.momenta[l] = p;
-                    p
+                for a in 0..N {
+                    self.forces[l][a] = first.q[a] + first.force[a];
                 }
+                first.z
+            } else {
+                let p = conjugate(self.model, t, &q, &v, &self.momenta[l])?;
+                self.model.first_and_mass(t, &q, &p, &mut first, &mut zz);
+                if with_masses {
+                    let inverse = Block::of(&zz).map_err(singular)?.inverse();
+                    zz = inverse;
+                }
+                for a in 0..N {
+                    self.forces[l][a] = first.force[a] - first.q[a];
+                }
+                self.momenta[l] = p;
+                p
             };
             if self.scheme.collocated {
                 rows[l] = p;
@@ -201,19 +198,16 @@ where
     ) -> Result<(), StepError> {
         let (t, q, v) = self.place(l, rates);
         let mut first = First::ZERO;
-        let sign = match M::FORM {
-            Form::Lagrangian => {
-                self.model.first(t, &q, &v, &mut first);
-                point.p = first.z;
-                1.0
-            }
-            Form::Hamiltonian => {
-                let p = conjugate(self.model, t, &q, &v, &self.momenta[l])?;
-                self.model.first(t, &q, &p, &mut first);
-                self.momenta[l] = p;
-                point.p = p;
-                -1.0
-            }
+        let sign = if const { M::FORM.is_lagrangian() } {
+            self.model.first(t, &q, &v, &mut first);
+            point.p = first.z;
+            1.0
+        } else {
+            let p = conjugate(self.model, t, &q, &v, &self.momenta[l])?;
+            self.model.first(t, &q, &p, &mut first);
+            self.momenta[l] = p;
+            point.p = p;
+            -1.0
         };
         for a in 0..N {
             point.force[a] = sign * first.q[a] + first.force[a] + self.span.damping * v[a];
@@ -235,23 +229,20 @@ where
             // Kernels write only structurally non-zero entries: nothing of the last call may remain.
             point.second = Second::ZERO;
         }
-        match M::FORM {
-            Form::Lagrangian => {
-                let mut first = First::ZERO;
-                self.model.second(t, &q, &v, &mut first, &mut point.second);
-                point.p = first.z;
-                for a in 0..N {
-                    point.force[a] = first.q[a] + first.force[a];
-                }
+        if const { M::FORM.is_lagrangian() } {
+            let mut first = First::ZERO;
+            self.model.second(t, &q, &v, &mut first, &mut point.second);
+            point.p = first.z;
+            for a in 0..N {
+                point.force[a] = first.q[a] + first.force[a];
             }
-            Form::Hamiltonian => {
-                let view = lagrangian_view_from(self.model, t, &q, &v, &self.momenta[l])?;
-                self.momenta[l] = view.p;
-                point.p = view.p;
-                point.second = view.second;
-                for a in 0..N {
-                    point.force[a] = view.first.q[a] + view.first.force[a];
-                }
+        } else {
+            let view = lagrangian_view_from(self.model, t, &q, &v, &self.momenta[l])?;
+            self.momenta[l] = view.p;
+            point.p = view.p;
+            point.second = view.second;
+            for a in 0..N {
+                point.force[a] = view.first.q[a] + view.first.force[a];
             }
         }
         if damping != 0.0 {

@@ -14,7 +14,7 @@ use crate::{
     dual::{Dual, duals},
     legendre::conjugate,
     lu::Block,
-    model::{ConstraintSecond, First, Form},
+    model::{ConstraintSecond, First},
 };
 #[cfg(feature = "alloc")]
 use alloc::{vec, vec::Vec};
@@ -293,38 +293,35 @@ where
 {
     let mut first = First::zero();
     let (mut momentum, mut force) = ([0.0; N], [0.0; N]);
-    match M::FORM {
-        Form::Lagrangian => {
-            model.first(t, q, &duals(v, &[0.0; N]), &mut first);
-            for a in 0..N {
-                momentum[a] = first.z[a].slope;
-                force[a] = first.q[a].slope + first.force[a].slope;
-            }
+    if const { M::FORM.is_lagrangian() } {
+        model.first(t, q, &duals(v, &[0.0; N]), &mut first);
+        for a in 0..N {
+            momentum[a] = first.z[a].slope;
+            force[a] = first.q[a].slope + first.force[a].slope;
         }
+    } else {
         // At constant v the momentum moves: H_pp δp = −δH_p.
-        Form::Hamiltonian => {
-            let mut place = [0.0; N];
-            for a in 0..N {
-                place[a] = q[a].value;
-            }
-            let p = conjugate(model, t.value, &place, v, guess)?;
-            model.first(t, q, &duals(&p, &[0.0; N]), &mut first);
-            let (mut plain, mut zz) = (First::ZERO, [[0.0; N]; N]);
-            model.first_and_mass(t.value, &place, &p, &mut plain, &mut zz);
-            for a in 0..N {
-                momentum[a] = -first.z[a].slope;
-            }
-            let block = Block::of(&zz).map_err(|singular| {
-                StepError::Legendre(crate::error::LegendreError::Singular {
-                    coordinate: singular.column,
-                })
-            })?;
-            block.solve(&mut momentum);
-            let mut first = First::zero();
-            model.first(t, q, &duals(&p, &momentum), &mut first);
-            for a in 0..N {
-                force[a] = first.force[a].slope - first.q[a].slope;
-            }
+        let mut place = [0.0; N];
+        for a in 0..N {
+            place[a] = q[a].value;
+        }
+        let p = conjugate(model, t.value, &place, v, guess)?;
+        model.first(t, q, &duals(&p, &[0.0; N]), &mut first);
+        let (mut plain, mut zz) = (First::ZERO, [[0.0; N]; N]);
+        model.first_and_mass(t.value, &place, &p, &mut plain, &mut zz);
+        for a in 0..N {
+            momentum[a] = -first.z[a].slope;
+        }
+        let block = Block::of(&zz).map_err(|singular| {
+            StepError::Legendre(crate::error::LegendreError::Singular {
+                coordinate: singular.column,
+            })
+        })?;
+        block.solve(&mut momentum);
+        let mut first = First::zero();
+        model.first(t, q, &duals(&p, &momentum), &mut first);
+        for a in 0..N {
+            force[a] = first.force[a].slope - first.q[a].slope;
         }
     }
     Ok((momentum, force))
