@@ -6,6 +6,7 @@
 
 pub(crate) mod choose;
 mod combine;
+mod constrains;
 mod derivative;
 pub(crate) mod element;
 #[cfg(feature = "alloc")]

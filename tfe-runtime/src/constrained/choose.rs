@@ -1,8 +1,9 @@
 //! Which rows are independent, in the units that the kinetic energy gives to coordinates where their lengths do not tell.
 
+use super::constrains::Constrains;
 use super::node::is_regular;
 use super::rows::{DEPENDENT, Rows, in_units, norm, scaled, subtract_part, unit};
-use crate::model::{Constraint, First, Form, Model};
+use crate::model::{Constraint, Form};
 
 /// Below it what a dependent row has of its own is rounding.
 const NOISE: f64 = 1e-13;
@@ -16,20 +17,14 @@ const CLEAR: f64 = 1e-6;
 /// than rounding errors, coordinates are measured in the square roots of their inertias.
 ///
 /// Returns the units in which all marked rows are independent; ones unless more rows were found in other units.
-pub(crate) fn choose<M, const N: usize>(
+pub(crate) fn choose<const N: usize>(
     rows: &mut Rows<'_, N>,
-    model: &M,
+    model: &dyn Constrains<N>,
     (t, q): (f64, &[f64; N]),
     active: &mut [usize],
-) -> [f64; N]
-where
-    M: Model<N>,
-{
+) -> [f64; N] {
     let plain = [1.0; N];
-    if const { M::CONSTRAINTS.is_empty() } {
-        return plain;
-    }
-    let rank = rows.choose(M::CONSTRAINTS, active);
+    let rank = rows.choose(model.declared(), active);
     match rank < active.len() && rows.has_left(active) {
         true => choose_more(rows, model, (t, q), active).unwrap_or(plain),
         false => plain,
@@ -38,17 +33,13 @@ where
 
 #[cold]
 #[inline(never)]
-fn choose_more<M, const N: usize>(
+fn choose_more<const N: usize>(
     rows: &mut Rows<'_, N>,
-    model: &M,
+    model: &dyn Constrains<N>,
     (t, q): (f64, &[f64; N]),
     active: &mut [usize],
-) -> Option<[f64; N]>
-where
-    M: Model<N>,
-{
-    let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
-    model.first_and_mass(t, q, &[0.0; N], &mut first, &mut zz);
+) -> Option<[f64; N]> {
+    let zz = model.mass_at(t, q, &[0.0; N]);
     // Coordinates without an inertia of their own have no such unit.
     if !is_regular(zz) {
         return None;
@@ -56,7 +47,7 @@ where
     let mut units = [0.0; N];
     for a in 0..N {
         let root = crate::real::Real::sqrt(zz[a][a].abs());
-        units[a] = match M::FORM {
+        units[a] = match model.form() {
             Form::Lagrangian => 1.0 / root,
             Form::Hamiltonian => root,
         };
@@ -66,7 +57,7 @@ where
     }
     let rank = |active: &[usize]| active.iter().filter(|mark| **mark != 0).count();
     let before = rank(active);
-    rows.choose_in_units(M::CONSTRAINTS, &units, active);
+    rows.choose_in_units(model.declared(), &units, active);
     (rank(active) > before).then_some(units)
 }
 

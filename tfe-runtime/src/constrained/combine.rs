@@ -1,9 +1,10 @@
 //! Redundant holonomic constraints in an element: they are replaced by as many combinations as are independent (T-118,
 //! T-132).
 
+use super::constrains::Constrains;
 use super::rows::{
-    COMBINED, Constrains, DEPENDENT, Rows, add_row, dot, has_digits, in_units, longest, norm,
-    scaled, scaled_norm, subtract_part, unit,
+    COMBINED, DEPENDENT, Rows, add_row, dot, has_digits, in_units, longest, norm, scaled,
+    scaled_norm, subtract_part, unit,
 };
 use crate::legendre::largest;
 

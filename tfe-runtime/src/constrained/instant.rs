@@ -1,5 +1,6 @@
 //! Constraints at one instant of a motion: their reactions and their gradients.
 
+use crate::constrained::constrains::Constrains;
 use crate::constrained::derivative::{DualRows, explicit};
 use crate::constrained::rows::{dot, norm, rows_len, scaled, scaled_norm};
 use crate::constrained::states::chosen;
@@ -41,15 +42,12 @@ where
     Ok(gradients_with(second, model, (t, &state.q, v)))
 }
 
-fn gradients_with<M, const N: usize>(
+fn gradients_with<const N: usize>(
     second: Second<f64, N>,
-    model: &M,
+    model: &dyn Constrains<N>,
     (t, q, v): (f64, &[f64; N], &[f64; N]),
-) -> Gradients<N>
-where
-    M: Model<N>,
-{
-    let mut memory = vec![0.0; rows_len(N, M::CONSTRAINTS.len())];
+) -> Gradients<N> {
+    let mut memory = vec![0.0; rows_len(N, model.declared().len())];
     let (mut rows, active) = chosen(model, (t, q), &mut memory);
     rows.differentiate(model, t, q, v);
     Gradients {

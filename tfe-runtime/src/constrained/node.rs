@@ -1,10 +1,10 @@
 //! Constraints at one instant: the velocity that belongs to a momentum, independent rows, residuals.
 
+use crate::constrained::constrains::Constrains;
 use crate::constrained::rows::{DEPENDENT, Rows, in_units, norm, scaled, subtract_part, unit};
 use crate::error::{ConstraintError, LegendreError, StepError};
-use crate::legendre::{lagrangian_view_from, velocity as free_velocity};
 use crate::lu;
-use crate::model::{First, Form, Model};
+use crate::model::Form;
 
 /// The largest number of iterations of Newton's method for the velocity of a momentum; one suffices where the energy is
 /// quadratic in z.
@@ -31,18 +31,15 @@ pub(crate) struct Bordered<'a> {
 ///
 /// `rows` holds A and a at (t, q); only marked constraints are used. The mass matrix may be singular where the
 /// constraints determine the motion.
-pub(crate) fn solve_velocity<M, const N: usize>(
-    model: &M,
+pub(crate) fn solve_velocity<const N: usize>(
+    model: &dyn Constrains<N>,
     t: f64,
     (q, p): (&[f64; N], &[f64; N]),
     guess: &[f64; N],
     rows: &Rows<'_, N>,
     active: &[usize],
     memory: &mut Bordered<'_>,
-) -> Result<[f64; N], StepError>
-where
-    M: Model<N>,
-{
+) -> Result<[f64; N], StepError> {
     let size = N + active.len();
     let matrix = &mut memory.matrix[..size * size];
     let vector = &mut memory.vector[..size];
@@ -51,18 +48,10 @@ where
     let mut last = f64::INFINITY;
     for _ in 0..MOST {
         matrix.fill(0.0);
-        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
-        match M::FORM {
-            Form::Lagrangian => model.first_and_mass(t, q, &v, &mut first, &mut zz),
-            Form::Hamiltonian => {
-                let view = lagrangian_view_from(model, t, q, &v, &momentum)?;
-                (first, zz, momentum) = (view.first, view.second.zz, view.p);
-                first.z = view.p;
-            }
-        }
+        let (by_velocity, zz) = model.momentum_and_mass(t, q, &v, &mut momentum)?;
         border(matrix, &zz, rows, active);
         for a in 0..N {
-            vector[a] = p[a] - first.z[a];
+            vector[a] = p[a] - by_velocity[a];
         }
         for (c, mark) in active.iter().enumerate() {
             vector[N + c] = if *mark == 0 { 0.0 } else { -rows.psi(c, &v) };
@@ -83,7 +72,7 @@ where
         if !v.iter().all(|v| v.is_finite()) {
             return Err(StepError::NonFinite);
         }
-        if is_settled(step, last, scale) || (M::FACTS.quadratic_in_z && last.is_finite()) {
+        if is_settled(step, last, scale) || (model.is_quadratic() && last.is_finite()) {
             return Ok(v);
         }
         last = step;
@@ -220,24 +209,17 @@ pub(crate) fn is_regular<const N: usize>(mut zz: [[f64; N]; N]) -> bool {
 ///
 /// # Errors
 /// [`LegendreError`] if none is found although the mass matrix is regular.
-pub(crate) fn own_velocity<M, const N: usize>(
-    model: &M,
+pub(crate) fn own_velocity<const N: usize>(
+    model: &dyn Constrains<N>,
     t: f64,
     q: &[f64; N],
     p: &[f64; N],
     v: &[f64; N],
-) -> Result<[f64; N], LegendreError>
-where
-    M: Model<N>,
-{
-    if matches!(M::FORM, Form::Lagrangian) {
-        let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
-        model.first_and_mass(t, q, v, &mut first, &mut zz);
-        if !is_regular(zz) {
-            return Ok(*v);
-        }
+) -> Result<[f64; N], LegendreError> {
+    if matches!(model.form(), Form::Lagrangian) && !is_regular(model.mass_at(t, q, v)) {
+        return Ok(*v);
     }
-    free_velocity(model, t, q, p, v)
+    model.free_velocity(t, q, p, v)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! The check of constraints relative to the size of their own terms, in steps.
 
+use super::constrains::Constrains;
 use super::rows::Rows;
-use crate::model::Model;
 
 /// The first holonomic constraint that a state violates by more than a start may, relative to the size of its own terms
 /// (T-165): whether by positions, and the relative violation. `None` without the standard library, on which enclosures
@@ -9,16 +9,13 @@ use crate::model::Model;
 ///
 /// `left` is the error that iterations may leave, relative to all positions and velocities. The rows have been evaluated
 /// as declared, if they are given.
-pub(crate) fn violated<M, const N: usize>(
-    model: &M,
+pub(crate) fn violated<const N: usize>(
+    model: &dyn Constrains<N>,
     t: f64,
     (q, v): (&[f64; N], &[f64; N]),
     (h, left): (f64, f64),
     rows: Option<&Rows<'_, N>>,
-) -> Option<(usize, bool, f64)>
-where
-    M: Model<N>,
-{
+) -> Option<(usize, bool, f64)> {
     #[cfg(feature = "std")]
     {
         let scales = super::start::Scales {

@@ -1,6 +1,7 @@
 //! Constraints evaluated at a point, on memory provided by the caller.
 
-use crate::model::{Constraint, ConstraintSecond, Model};
+use crate::constrained::constrains::Constrains;
+use crate::model::{Constraint, ConstraintSecond};
 
 /// The number of values that [`Rows`] needs.
 pub(crate) const fn rows_len(coordinates: usize, constraints: usize) -> usize {
@@ -20,59 +21,6 @@ pub(super) const DEPENDENT: f64 = 1e-10;
 
 /// A row that was chosen before stays chosen while its orthogonal part is at least this fraction.
 const KEPT: f64 = 0.1;
-
-/// The constraints of a model without its type: code that is rarely needed is compiled once for all models.
-pub(crate) trait Constrains<const N: usize> {
-    /// The constraints, in order.
-    fn declared(&self) -> &'static [Constraint];
-
-    /// A, a and φ.
-    fn values_at(
-        &self,
-        t: f64,
-        q: &[f64; N],
-        rows: &mut [[f64; N]],
-        numbers: (&mut [f64], &mut [f64]),
-    );
-
-    /// ψ_q, Ȧ and the second derivatives weighted by multipliers.
-    fn second_at(
-        &self,
-        t: f64,
-        q: &[f64; N],
-        v: &[f64; N],
-        mu: &[f64],
-        second: &mut ConstraintSecond<'_, f64, N>,
-    );
-}
-
-impl<M: Model<N>, const N: usize> Constrains<N> for M {
-    fn declared(&self) -> &'static [Constraint] {
-        M::CONSTRAINTS
-    }
-
-    fn values_at(
-        &self,
-        t: f64,
-        q: &[f64; N],
-        rows: &mut [[f64; N]],
-        (drift, values): (&mut [f64], &mut [f64]),
-    ) {
-        self.constraint_rows(t, q, rows, drift);
-        self.constraint_values(t, q, values);
-    }
-
-    fn second_at(
-        &self,
-        t: f64,
-        q: &[f64; N],
-        v: &[f64; N],
-        mu: &[f64],
-        second: &mut ConstraintSecond<'_, f64, N>,
-    ) {
-        self.constraint_second(t, q, v, mu, second);
-    }
-}
 
 /// The constraints at the point that was evaluated last; one row, or one number, for each.
 pub(crate) struct Rows<'a, const N: usize> {

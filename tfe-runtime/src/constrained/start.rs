@@ -1,7 +1,8 @@
 //! The violation of constraints by a state, relative to the size of the terms of each constraint.
 
+use super::constrains::Constrains;
 use super::residual::over;
-use super::rows::{Constrains, Rows, norm, rows_len};
+use super::rows::{Rows, norm, rows_len};
 use super::states::{Residual, residuals_of};
 use crate::control::START_TOLERANCE;
 use crate::enclosure::Enclosure;
@@ -37,13 +38,22 @@ pub fn start_residuals<M, const N: usize>(
 where
     M: Model<N>,
 {
+    start_residuals_of(model, t, (q, v), h)
+}
+
+fn start_residuals_of<const N: usize>(
+    model: &dyn Constrains<N>,
+    t: f64,
+    (q, v): (&[f64; N], &[f64; N]),
+    h: f64,
+) -> Vec<Residual> {
     let mut residuals = residuals_of(model, t, (q, v), h);
     let scales = Scales {
         h,
         extent: norm(q),
         tolerance: 0.0,
     };
-    let own = own_residuals(model, t, (q, v), scales);
+    let own = own_residuals_of(model, t, (q, v), scales);
     for (residual, (position, velocity)) in residuals.iter_mut().zip(own) {
         // NaN stays NaN.
         if position > residual.relative_position {
@@ -79,27 +89,32 @@ pub fn own_residuals<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let exactly = |x: f64| Enclosure::between(x, x);
-    let mut bounds = vec![Enclosure::ZERO; M::CONSTRAINTS.len()];
-    model.constraint_values(exactly(t), &q.map(exactly), &mut bounds);
-    beside_own(model, t, (q, v), scales, &bounds)
+    own_residuals_of(model, t, (q, v), scales)
+}
+
+fn own_residuals_of<const N: usize>(
+    model: &dyn Constrains<N>,
+    t: f64,
+    at: (&[f64; N], &[f64; N]),
+    scales: Scales,
+) -> Vec<(f64, f64)> {
+    let mut bounds = vec![Enclosure::ZERO; model.declared().len()];
+    model.bounds_at(t, at.0, &mut bounds);
+    beside_own(model, t, at, scales, &bounds)
 }
 
 /// The first holonomic constraint that is violated by more than a start may, relative to the size of its own terms:
 /// whether by positions, and the relative violation. The rows have been evaluated; if they are the declared ones, they
 /// tell at little cost that nothing is violated.
-pub(crate) fn violated<M, const N: usize>(
-    model: &M,
+pub(crate) fn violated<const N: usize>(
+    model: &dyn Constrains<N>,
     t: f64,
     (q, v): (&[f64; N], &[f64; N]),
     scales: Scales,
     rows: Option<&Rows<'_, N>>,
-) -> Option<(usize, bool, f64)>
-where
-    M: Model<N>,
-{
+) -> Option<(usize, bool, f64)> {
     let is_suspect = |rows: &Rows<'_, N>| {
-        (M::CONSTRAINTS.iter().enumerate()).any(|(c, constraint)| {
+        (model.declared().iter().enumerate()).any(|(c, constraint)| {
             constraint.kind.is_holonomic() && {
                 let (phi, psi) = beyond_roundings(rows, c, t, (q, v), scales);
                 phi > 0.0 || psi > 0.0
@@ -114,16 +129,15 @@ where
 
 #[cold]
 #[inline(never)]
-fn first_violated<M, const N: usize>(
-    model: &M,
+fn first_violated<const N: usize>(
+    model: &dyn Constrains<N>,
     t: f64,
     at: (&[f64; N], &[f64; N]),
     scales: Scales,
-) -> Option<(usize, bool, f64)>
-where
-    M: Model<N>,
-{
-    let own = own_residuals(model, t, at, scales).into_iter().enumerate();
+) -> Option<(usize, bool, f64)> {
+    let own = own_residuals_of(model, t, at, scales)
+        .into_iter()
+        .enumerate();
     let mut parts = own.flat_map(|(c, (position, velocity))| {
         let (position, velocity) = ((c, true, position), (c, false, velocity));
         [position, velocity]

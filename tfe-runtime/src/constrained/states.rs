@@ -1,9 +1,10 @@
 //! Constraints at one state: the velocity that belongs to its momentum, independent constraints, residuals.
 
 use super::choose::choose;
+use super::constrains::Constrains;
 use super::node::{Bordered, own_velocity, solve_velocity};
 use crate::constrained::residual::relative_residual;
-use crate::constrained::rows::{Constrains, Rows, rows_len};
+use crate::constrained::rows::{Rows, rows_len};
 use crate::error::StepError;
 use crate::model::Model;
 use alloc::vec;
@@ -102,16 +103,13 @@ where
 }
 
 /// The rows at a position, and marks of the independent ones, in memory of [`rows_len`] numbers.
-pub(super) fn chosen<'a, M, const N: usize>(
-    model: &M,
+pub(super) fn chosen<'a, const N: usize>(
+    model: &dyn Constrains<N>,
     (t, q): (f64, &[f64; N]),
     memory: &'a mut [f64],
-) -> (Rows<'a, N>, Vec<usize>)
-where
-    M: Model<N>,
-{
+) -> (Rows<'a, N>, Vec<usize>) {
     let mut rows = evaluated(model, (t, q), memory);
-    let mut active = vec![0; M::CONSTRAINTS.len()];
+    let mut active = vec![0; model.declared().len()];
     choose(&mut rows, model, (t, q), &mut active);
     (rows, active)
 }
@@ -143,7 +141,17 @@ where
     if const { M::CONSTRAINTS.is_empty() } {
         return Ok(crate::legendre::velocity(model, t, q, p, guess)?);
     }
-    let count = M::CONSTRAINTS.len();
+    held_velocity(model, t, (q, p), guess)
+}
+
+/// The same for a model that has constraints.
+fn held_velocity<const N: usize>(
+    model: &dyn Constrains<N>,
+    t: f64,
+    (q, p): (&[f64; N], &[f64; N]),
+    guess: &[f64; N],
+) -> Result<[f64; N], StepError> {
+    let count = model.declared().len();
     let size = N + count;
     let mut numbers = vec![0.0; rows_len(N, count)];
     let (rows, active) = chosen(model, (t, q), &mut numbers);
