@@ -18,11 +18,11 @@ use crate::constrained::choose::choose;
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
 use crate::constrained::rows::Rows;
-use crate::constrained::{self, linearise, refused};
+use crate::constrained::{self, check_element, linearise};
 use crate::dense::DenseElement;
 use crate::element::{Element, ElementError};
 use crate::equations::Span;
-use crate::error::{ConstraintError, LegendreError, StepError};
+use crate::error::{LegendreError, StepError};
 use crate::legendre;
 use crate::method::{Interval, Last, Memory, end_of, may_be_phase};
 use crate::model::{First, Model, State};
@@ -177,7 +177,12 @@ impl<const N: usize> Condenser<N> {
             let (q, v) = curve(middle);
             let state = legendre::state(model, middle, &q, &v)?;
             let reactions = constrained::reactions(model, middle, &state, &v);
-            layout.guess::<M, N>(scheme.nodes, reactions.ok().as_deref(), interior);
+            layout.guess(
+                M::CONSTRAINTS,
+                scheme.nodes,
+                reactions.ok().as_deref(),
+                interior,
+            );
             &mut interior[..layout.rates()]
         };
         let rates = interior.as_chunks_mut::<N>().0;
@@ -265,13 +270,7 @@ impl<const N: usize> Condenser<N> {
         let ends = condensed.ends;
         let end = if const { !M::CONSTRAINTS.is_empty() } {
             let element = scheme.element;
-            if let Some(constraint) = refused::<M, N>(&element) {
-                return Err(ConstraintError::Element {
-                    element,
-                    constraint,
-                }
-                .into());
-            }
+            check_element(M::CONSTRAINTS, element)?;
             parts.momenta.fill(start.p);
             let mut rows = Rows::at_start(parts.rows, model, time, &start.q);
             choose(&mut rows, model, (time, &start.q), parts.active);

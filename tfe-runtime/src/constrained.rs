@@ -4,9 +4,10 @@
 //! Elements satisfy them exactly at their nodes. This module treats a single instant: the velocity that belongs to a
 //! momentum under constraints, the residuals of the constraints, and which rows are linearly independent.
 
+mod balance;
 pub(crate) mod choose;
 mod combine;
-mod constrains;
+pub(crate) mod constrains;
 mod derivative;
 pub(crate) mod element;
 #[cfg(feature = "alloc")]
@@ -42,4 +43,4 @@ pub use trail::Trail;
 
 pub(crate) use derivative::linearise;
 #[cfg(feature = "alloc")]
-pub(crate) use layout::refused;
+pub(crate) use layout::check_element;

@@ -1,13 +1,13 @@
 //! Steps of models with constraints, by Newton's method with multipliers.
 
 use crate::constrained::choose::choose;
-use crate::constrained::element::ConstrainedForm;
-use crate::constrained::layout::Layout;
-use crate::constrained::layout::refused;
+use crate::constrained::constrains::Constrains;
+use crate::constrained::element::{ConstrainedForm, ElementConstraints};
+use crate::constrained::layout::{Layout, check_element};
 use crate::constrained::node::{Bordered, own_velocity, solve_velocity};
 use crate::constrained::own::violated;
 use crate::constrained::residual::relative_residual;
-use crate::constrained::rows::Rows;
+use crate::constrained::rows::{Independence, Rows};
 use crate::control::START_TOLERANCE;
 use crate::equations::Span;
 use crate::error::{ConstraintError, StepError};
@@ -15,7 +15,7 @@ use crate::evidence::{Energy, conserves_energy, rounding};
 use crate::legendre::largest;
 use crate::method::{Interval, Last, Memory, Method, set_kicks, total};
 use crate::model::{CoordinateName, Model, State};
-use crate::newton::{Beginning, Solve, newton};
+use crate::newton::{Beginning, Control, Solve, newton};
 use crate::scheme::{SchemeRef, Tables};
 use crate::velocity_form::VelocityForm;
 use crate::workspace::{Parts, Scratch, Workspace};
@@ -32,15 +32,8 @@ where
     M: Model<N>,
     T: Tables,
 {
-    let scheme = method.tables.view();
-    let element = scheme.element;
-    if let Some(constraint) = refused::<M, N>(&element) {
-        return Err(ConstraintError::Element {
-            element,
-            constraint,
-        }
-        .into());
-    }
+    let (model, scheme) = (method.model, method.tables.view());
+    check_element(M::CONSTRAINTS, scheme.element)?;
     if matches!(method.control.solve, Solve::FixedPoint) {
         return Err(ConstraintError::NeedsNewton.into());
     }
@@ -49,94 +42,32 @@ where
         length: h,
         impulses,
     } = interval;
-    let count = M::CONSTRAINTS.len();
-    let mut parts = Parts::of(workspace, &element, M::FORM, count)?;
+    let mut parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
     let is_foreseen = core::mem::take(&mut memory.is_foreseen) && memory.has_reached(state);
     let warm = is_foreseen || method.prepare(memory, &mut parts, h, state)?;
     set_kicks(&scheme, &interval, parts.kicks);
     let kicks: &[[f64; N]] = parts.kicks;
-    let layout = Layout::new(&element, N, count);
-    let mut rows = Rows::at_start(parts.rows, method.model, t, &state.q);
-    let start_rows = match memory.independence {
-        Some([_, end]) if warm => end,
-        _ => rows.independence(),
+    let step = Step {
+        model,
+        scheme,
+        control: method.control.with_constraints(),
+        layout: Layout::new(&scheme.element, N, M::CONSTRAINTS.len()),
+        times: (t, h),
+        start: state,
+        warm,
     };
-    if !warm {
-        parts.active.fill(0);
-    }
-    let units = choose(&mut rows, method.model, (t, &state.q), parts.active);
-    let mean = mean_rate(&scheme, parts.unknowns[..layout.rates()].as_chunks().0);
-    combine(
-        method.model,
-        &mut rows,
-        (t, h),
-        &state.q,
-        (&mean, &units),
-        parts.active,
-    );
-    if warm && rows.is_combined() {
-        for place in layout.multipliers() {
-            rows.combine_multipliers(&mut parts.unknowns[place]);
-        }
-    }
-    // After a failure there is no polynomial to continue from.
-    memory.last = None;
-    let low = if warm { memory.low } else { State::ZERO };
-    let cold = |unknowns: &mut [f64],
-                tangent: &mut [f64],
-                step: &mut [f64],
-                pivots: &mut [usize],
-                rows: &Rows<'_, N>,
-                active: &[usize]| {
-        let mut bordered = Bordered {
-            matrix: tangent,
-            vector: step,
-            pivots,
-        };
-        let at = (&state.q, &state.p);
-        let v = solve_velocity(method.model, t, at, &[0.0; N], rows, active, &mut bordered)?;
-        constant(&layout, &v, unknowns);
-        Ok::<_, StepError>(v)
-    };
-    let mut start_velocity = [0.0; N];
-    let end_places = layout.end(0)..layout.node(0);
-    if warm {
-        // The velocity at the end of the last element, which that element has left there.
-        start_velocity.copy_from_slice(&parts.unknowns[end_places.clone()]);
-        let rates = layout.rates();
-        let end: [f64; N] = end_velocity(&scheme, parts.unknowns[..rates].as_chunks().0);
-        parts.unknowns[end_places].copy_from_slice(&end);
-    } else {
-        let v = cold(
-            parts.unknowns,
-            parts.tangent,
-            parts.step,
-            parts.tangent_pivots,
-            &rows,
-            parts.active,
-        )?;
-        let left = method.control.with_constraints().tolerance;
-        check_start(method.model, (t, h, left), state, &v, &rows)?;
-        start_velocity = v;
-        let moving = (&v, &units);
-        combine(
-            method.model,
-            &mut rows,
-            (t, h),
-            &state.q,
-            moving,
-            parts.active,
-        );
-    }
+    let mut rows = Rows::at_start(parts.rows, model, t, &state.q);
     let mut scratch = Scratch {
         unknowns: parts.unknowns,
         step: parts.step,
         tangent: parts.tangent,
         pivots: parts.tangent_pivots,
     };
+    let begun = step.begin(memory, &mut rows, parts.active, &mut scratch)?;
+    let low = begun.low;
     let mut form = ConstrainedForm::new(
         VelocityForm {
-            model: method.model,
+            model,
             scheme,
             span: Span {
                 t,
@@ -153,55 +84,47 @@ where
             constant_mass: &mut memory.mass,
             statistics: &mut memory.statistics,
         },
-        layout,
+        step.layout,
         rows,
         parts.active,
         total(impulses, h),
     );
-    let control = method.control.with_constraints();
     let beginning = if warm {
         Beginning::Near
     } else {
         Beginning::Far
     };
-    let first = newton(&mut form, &control, &mut scratch, beginning, false);
-    let evidence = match first {
+    let evidence = match newton(&mut form, &step.control, &mut scratch, beginning, false) {
         Ok(evidence) => evidence,
         Err(error) if !warm => return Err(error),
         Err(_) => {
             // The continued polynomial may be a worse initial guess than a constant velocity.
-            form.constraints.rows.evaluate(method.model, t, &state.q);
-            cold(
-                scratch.unknowns,
-                scratch.tangent,
-                scratch.step,
-                scratch.pivots,
-                &form.constraints.rows,
-                form.constraints.active,
-            )?;
-            newton(&mut form, &control, &mut scratch, Beginning::Far, false)?
+            step.begin_again(&mut form.constraints, &mut scratch)?;
+            newton(
+                &mut form,
+                &step.control,
+                &mut scratch,
+                Beginning::Far,
+                false,
+            )?
         }
     };
     let (end, end_low) = form.end_state(scratch.unknowns)?;
-    if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
-        return Err(StepError::NonFinite);
-    }
-    form.check_end(scratch.unknowns, control.tolerance)?;
-    let end_rows = form.constraints.rows.independence();
-    // Constraints that depend on the time do work.
-    let is_conserved = conserves_energy::<M, N>()
-        && impulses.is_empty()
-        && form.constraints.rows.drift.iter().all(|a| *a == 0.0);
+    let constraints = &mut form.constraints;
+    step.check_end(constraints, scratch.unknowns, &end)?;
+    let end_rows = constraints.rows.independence();
+    let is_conserved =
+        const { conserves_energy::<M, N>() } && impulses.is_empty() && !constraints.rows.drifts();
     let energy = is_conserved.then(|| {
-        let velocities = [start_velocity, form.end_place(scratch.unknowns).2];
-        Energy::with(method.model, (t, h), [state, &end], &velocities)
+        let velocities = [begun.velocity, constraints.end_place(scratch.unknowns).2];
+        Energy::with(model, (t, h), [state, &end], &velocities)
     });
-    let rounding = || rounding(method.model, (t, h), [state, &end]);
-    evidence.check_with(method.control.solve, energy, element, &rounding)?;
+    let rounding = || rounding(model, (t, h), [state, &end]);
+    evidence.check_with(method.control.solve, energy, scheme.element, &rounding)?;
     // Between steps the rows are those of the constraints as declared.
-    if form.constraints.rows.is_combined() {
-        for place in layout.multipliers() {
-            form.constraints
+    if constraints.rows.is_combined() {
+        for place in step.layout.multipliers() {
+            constraints
                 .rows
                 .declared_multipliers(&mut scratch.unknowns[place]);
         }
@@ -213,11 +136,183 @@ where
         start_low: low,
         end,
     });
-    memory.independence = Some([start_rows, end_rows]);
+    memory.independence = Some([begun.independence, end_rows]);
     memory.low = end_low;
     memory.statistics.steps += 1;
     *state = end;
     Ok(())
+}
+
+/// A step, without the type of the model.
+struct Step<'a, const N: usize> {
+    model: &'a dyn Constrains<N>,
+    scheme: SchemeRef<'a>,
+    control: Control,
+    layout: Layout,
+    /// The time at the start, and the length.
+    times: (f64, f64),
+    start: &'a State<N>,
+    /// Whether the unknowns continue the last step, or are foreseen.
+    warm: bool,
+}
+
+/// What a step begins with.
+struct Begun<const N: usize> {
+    /// The velocity at the start.
+    velocity: [f64; N],
+    /// The rounding error of the start.
+    low: State<N>,
+    /// The independence of the rows at the start.
+    independence: Independence,
+}
+
+impl<const N: usize> Step<'_, N> {
+    /// Chooses independent rows, and completes the initial guess.
+    fn begin(
+        &self,
+        memory: &mut Memory<N>,
+        rows: &mut Rows<'_, N>,
+        active: &mut [usize],
+        scratch: &mut Scratch<'_>,
+    ) -> Result<Begun<N>, StepError> {
+        let independence = match memory.independence {
+            Some([_, end]) if self.warm => end,
+            _ => rows.independence(),
+        };
+        if !self.warm {
+            active.fill(0);
+        }
+        let units = choose(rows, self.model, (self.times.0, &self.start.q), active);
+        let rates = self.layout.rates();
+        let mean = mean_rate(&self.scheme, scratch.unknowns[..rates].as_chunks().0);
+        self.combine(rows, (&mean, &units), active);
+        if self.warm && rows.is_combined() {
+            for place in self.layout.multipliers() {
+                rows.combine_multipliers(&mut scratch.unknowns[place]);
+            }
+        }
+        // After a failure there is no polynomial to continue from.
+        memory.last = None;
+        let (velocity, low) = if self.warm {
+            (self.continued(scratch.unknowns), memory.low)
+        } else {
+            let v = self.cold(rows, active, scratch)?;
+            self.check_start(&v, rows)?;
+            self.combine(rows, (&v, &units), active);
+            (v, State::ZERO)
+        };
+        Ok(Begun {
+            velocity,
+            low,
+            independence,
+        })
+    }
+
+    /// Begins once more, from a constant velocity.
+    fn begin_again(
+        &self,
+        constraints: &mut ElementConstraints<'_, N>,
+        scratch: &mut Scratch<'_>,
+    ) -> Result<(), StepError> {
+        let (t, q) = (self.times.0, &self.start.q);
+        constraints.rows.evaluate(self.model, t, q);
+        self.cold(&constraints.rows, constraints.active, scratch)?;
+        Ok(())
+    }
+
+    /// Sets the velocity at the end to that of the continued polynomial. Returns the velocity at the start: that at the
+    /// end of the last element, which that element has left in the place of the other.
+    fn continued(&self, unknowns: &mut [f64]) -> [f64; N] {
+        let places = self.layout.end(0)..self.layout.node(0);
+        let mut start = [0.0; N];
+        start.copy_from_slice(&unknowns[places.clone()]);
+        let rates = unknowns[..self.layout.rates()].as_chunks().0;
+        let end: [f64; N] = end_velocity(&self.scheme, rates);
+        unknowns[places].copy_from_slice(&end);
+        start
+    }
+
+    /// Sets the initial guess of constant velocity and zero reactions; returns the velocity.
+    fn cold(
+        &self,
+        rows: &Rows<'_, N>,
+        active: &[usize],
+        scratch: &mut Scratch<'_>,
+    ) -> Result<[f64; N], StepError> {
+        let mut bordered = Bordered {
+            matrix: scratch.tangent,
+            vector: scratch.step,
+            pivots: scratch.pivots,
+        };
+        let (t, at) = (self.times.0, (&self.start.q, &self.start.p));
+        let guess = [0.0; N];
+        let v = solve_velocity(self.model, t, at, &guess, rows, active, &mut bordered)?;
+        constant(&self.layout, &v, scratch.unknowns);
+        Ok(v)
+    }
+
+    /// Replaces linearly dependent rows by combinations, for an element with this mean rate and coordinates in these
+    /// units.
+    fn combine(
+        &self,
+        rows: &mut Rows<'_, N>,
+        (rate, units): (&[f64; N], &[f64; N]),
+        active: &mut [usize],
+    ) {
+        let mut marks = self.model.declared().iter().zip(&*active);
+        if marks.all(|(one, mark)| !one.kind.is_holonomic() || *mark != 0) {
+            return;
+        }
+        let ((t, h), start) = (self.times, &self.start.q);
+        let mut middle = *start;
+        for a in 0..N {
+            middle[a] += 0.5 * h * rate[a];
+        }
+        let places = [(t, start), (t + 0.5 * h, &middle)];
+        rows.combine(self.model, places, (rate, units), active);
+    }
+
+    /// Refuses a start that violates the constraints by more than the tolerance of iterations may have left.
+    fn check_start(&self, v: &[f64; N], rows: &Rows<'_, N>) -> Result<(), StepError> {
+        let (model, (t, h)) = (self.model, self.times);
+        let State { q, p } = self.start;
+        let declared = model.declared();
+        let v = own_velocity(model, t, q, p, v)?;
+        let refused = |c: usize, position: bool, residual: f64| {
+            Err(ConstraintError::Start {
+                constraint: CoordinateName::single(declared[c].name),
+                position,
+                residual,
+            }
+            .into())
+        };
+        for c in 0..declared.len() {
+            let (position, velocity) = relative_residual(rows, c, q, &v, h);
+            for (residual, is_position) in [(position, true), (velocity, false)] {
+                if !(residual <= START_TOLERANCE) {
+                    return refused(c, is_position, residual);
+                }
+            }
+        }
+        let as_declared = (!rows.is_combined()).then_some(rows);
+        match violated(model, t, (q, &v), (h, self.control.tolerance), as_declared) {
+            Some((c, is_position, residual)) => refused(c, is_position, residual),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses an end that is not finite or violates the constraints.
+    fn check_end(
+        &self,
+        constraints: &mut ElementConstraints<'_, N>,
+        unknowns: &[f64],
+        end: &State<N>,
+    ) -> Result<(), StepError> {
+        if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
+            return Err(StepError::NonFinite);
+        }
+        constraints.check_end(self.model, unknowns, self.control.tolerance)
+    }
 }
 
 /// The initial guess of constant velocity and zero reactions.
@@ -238,29 +333,6 @@ fn mean_rate<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64
     mean
 }
 
-/// Replaces linearly dependent rows by combinations, for an element with this mean rate and coordinates in these units.
-fn combine<M, const N: usize>(
-    model: &M,
-    rows: &mut Rows<'_, N>,
-    (t, h): (f64, f64),
-    start: &[f64; N],
-    (rate, units): (&[f64; N], &[f64; N]),
-    active: &mut [usize],
-) where
-    M: Model<N>,
-{
-    let mut marks = M::CONSTRAINTS.iter().zip(&*active);
-    if marks.all(|(one, mark)| !one.kind.is_holonomic() || *mark != 0) {
-        return;
-    }
-    let mut middle = *start;
-    for a in 0..N {
-        middle[a] += 0.5 * h * rate[a];
-    }
-    let places = [(t, start), (t + 0.5 * h, &middle)];
-    rows.combine(model, places, (rate, units), active);
-}
-
 /// The velocity at the end of the element, from the polynomial of the rates.
 fn end_velocity<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64; N] {
     let mut v = [0.0; N];
@@ -273,39 +345,4 @@ fn end_velocity<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [
         }
     }
     v
-}
-
-/// Refuses a start that violates the constraints by more than the tolerance of iterations may have left.
-fn check_start<M, const N: usize>(
-    model: &M,
-    (t, h, left): (f64, f64, f64),
-    state: &State<N>,
-    v: &[f64; N],
-    rows: &Rows<'_, N>,
-) -> Result<(), StepError>
-where
-    M: Model<N>,
-{
-    let v = own_velocity(model, t, &state.q, &state.p, v)?;
-    let refused = |c: usize, position: bool, residual: f64| {
-        Err(ConstraintError::Start {
-            constraint: CoordinateName::single(M::CONSTRAINTS[c].name),
-            position,
-            residual,
-        }
-        .into())
-    };
-    for c in 0..M::CONSTRAINTS.len() {
-        let (position, velocity) = relative_residual(rows, c, &state.q, &v, h);
-        for (residual, is_position) in [(position, true), (velocity, false)] {
-            if !(residual <= START_TOLERANCE) {
-                return refused(c, is_position, residual);
-            }
-        }
-    }
-    let declared = (!rows.is_combined()).then_some(rows);
-    match violated(model, t, (&state.q, &v), (h, left), declared) {
-        Some((c, is_position, residual)) => refused(c, is_position, residual),
-        None => Ok(()),
-    }
 }

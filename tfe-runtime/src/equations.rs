@@ -2,6 +2,7 @@
 
 use crate::error::StepError;
 use crate::model::State;
+use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 
 /// The equations of one element for its unknown rates x.
@@ -67,6 +68,84 @@ pub(crate) struct Span<'a, const N: usize> {
     pub(crate) kicks: &'a [[f64; N]],
     /// The factor γ of an additional force γ v; zero in ordinary steps.
     pub(crate) damping: f64,
+}
+
+/// What follows from rates as unknowns, whatever the model.
+impl<const N: usize> Span<'_, N> {
+    /// Time, coordinates and velocities at a point.
+    #[inline(always)]
+    pub(crate) fn place(
+        &self,
+        scheme: &SchemeRef<'_>,
+        l: usize,
+        rates: &[[f64; N]],
+    ) -> (f64, [f64; N], [f64; N]) {
+        let Self {
+            t, h, start, low, ..
+        } = *self;
+        let row = l * rates.len()..(l + 1) * rates.len();
+        let rate = weighted(
+            &scheme.position[row.clone()],
+            &scheme.position_low[row.clone()],
+            rates,
+        );
+        let q = moved(&start.q, &low.q, h, &rate);
+        let v = if scheme.collocated {
+            rates[l]
+        } else {
+            let mut v = [0.0; N];
+            for (weight, rate) in scheme.velocity[row].iter().zip(rates) {
+                for a in 0..N {
+                    v[a] += weight * rate[a];
+                }
+            }
+            v
+        };
+        (t + scheme.nodes[l] * h, q, v)
+    }
+
+    /// Subtracts p₀ and the impulse of forces and kicks from the rows.
+    #[inline(always)]
+    pub(crate) fn subtract_impulse(
+        &self,
+        scheme: &SchemeRef<'_>,
+        forces: &[[f64; N]],
+        rows: &mut [[f64; N]],
+    ) {
+        let Self {
+            h,
+            start,
+            low,
+            kicks,
+            ..
+        } = *self;
+        let points = scheme.points();
+        for (i, row) in rows.iter_mut().enumerate() {
+            let range = i * points..(i + 1) * points;
+            let impulse = weighted(
+                &scheme.force[range.clone()],
+                &scheme.force_low[range],
+                forces,
+            );
+            for a in 0..N {
+                row[a] = (row[a] - start.p[a]) - (h * impulse[a] + (kicks[i][a] + low.p[a]));
+            }
+        }
+    }
+
+    /// The size of an increment of the rates x.
+    pub(crate) fn measure_rates(&self, x: &[f64], step: &[f64]) -> Increment {
+        let position = relative(self.h, &self.start.q, x, step);
+        // The momentum at the end is as accurate as the velocities, whatever the step. The rest of an increment affects
+        // it through the forces only, hence the factor.
+        let velocity = 0.25 * relative(1.0, &[], x, step);
+        let relative = if (velocity + position).is_nan() {
+            f64::NAN
+        } else {
+            velocity.max(position)
+        };
+        Increment { relative, position }
+    }
 }
 
 /// Σ (high + low) · row.

@@ -7,7 +7,7 @@
 //! with v_l = Σ_j E_lj ν_j and q_l = q₀ + h Σ_j C_lj ν_j. Every element solves a Lagrangian in this form, and a
 //! Hamiltonian by way of the pointwise Legendre transform where it has no phase-space form.
 
-use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
+use crate::equations::{Equations, Increment, Span};
 use crate::error::{LegendreError, StepError};
 use crate::legendre::{conjugate, lagrangian_view_from};
 use crate::lu::{Block, factor_block, solve};
@@ -79,29 +79,7 @@ where
     /// Time, coordinates and velocities at a point.
     #[inline(always)]
     pub(crate) fn place(&self, l: usize, rates: &[[f64; N]]) -> (f64, [f64; N], [f64; N]) {
-        let Span {
-            t, h, start, low, ..
-        } = self.span;
-        let row = l * rates.len()..(l + 1) * rates.len();
-        let scheme = &self.scheme;
-        let rate = weighted(
-            &scheme.position[row.clone()],
-            &scheme.position_low[row.clone()],
-            rates,
-        );
-        let q = moved(&start.q, &low.q, h, &rate);
-        let v = if scheme.collocated {
-            rates[l]
-        } else {
-            let mut v = [0.0; N];
-            for (weight, rate) in scheme.velocity[row].iter().zip(rates) {
-                for a in 0..N {
-                    v[a] += weight * rate[a];
-                }
-            }
-            v
-        };
-        (t + scheme.nodes[l] * h, q, v)
+        self.span.place(&self.scheme, l, rates)
     }
 
     /// Computes the residual and the forces, and on request the mass matrices of the rows.
@@ -168,43 +146,24 @@ where
     /// Subtracts p₀ and the impulse of forces and kicks from the rows.
     #[inline(always)]
     pub(crate) fn subtract_impulse(&self, rows: &mut [[f64; N]]) {
-        let Span {
-            h,
-            start,
-            low,
-            kicks,
-            ..
-        } = self.span;
-        let points = self.scheme.points();
-        for (i, row) in rows.iter_mut().enumerate() {
-            let range = i * points..(i + 1) * points;
-            let impulse = weighted(
-                &self.scheme.force[range.clone()],
-                &self.scheme.force_low[range],
-                self.forces,
-            );
-            for a in 0..N {
-                row[a] = (row[a] - start.p[a]) - (h * impulse[a] + (kicks[i][a] + low.p[a]));
-            }
-        }
+        self.span.subtract_impulse(&self.scheme, self.forces, rows);
     }
 
-    /// Momentum and force at a point.
-    pub(crate) fn values(
+    /// Momentum and force at a point with this [place](Self::place).
+    pub(crate) fn values_at(
         &mut self,
         l: usize,
-        rates: &[[f64; N]],
+        (t, q, v): (f64, &[f64; N], &[f64; N]),
         point: &mut PointDerivatives<N>,
     ) -> Result<(), StepError> {
-        let (t, q, v) = self.place(l, rates);
         let mut first = First::ZERO;
         let sign = if const { M::FORM.is_lagrangian() } {
-            self.model.first(t, &q, &v, &mut first);
+            self.model.first(t, q, v, &mut first);
             point.p = first.z;
             1.0
         } else {
-            let p = conjugate(self.model, t, &q, &v, &self.momenta[l])?;
-            self.model.first(t, &q, &p, &mut first);
+            let p = conjugate(self.model, t, q, v, &self.momenta[l])?;
+            self.model.first(t, q, &p, &mut first);
             self.momenta[l] = p;
             point.p = p;
             -1.0
@@ -224,6 +183,16 @@ where
         point: &mut PointDerivatives<N>,
     ) -> Result<(), StepError> {
         let (t, q, v) = self.place(l, rates);
+        self.derivatives_at(l, (t, &q, &v), point)
+    }
+
+    /// The same at a point with this place.
+    pub(crate) fn derivatives_at(
+        &mut self,
+        l: usize,
+        (t, q, v): (f64, &[f64; N], &[f64; N]),
+        point: &mut PointDerivatives<N>,
+    ) -> Result<(), StepError> {
         let damping = self.span.damping;
         if damping != 0.0 {
             // Kernels write only structurally non-zero entries: nothing of the last call may remain.
@@ -231,13 +200,13 @@ where
         }
         if const { M::FORM.is_lagrangian() } {
             let mut first = First::ZERO;
-            self.model.second(t, &q, &v, &mut first, &mut point.second);
+            self.model.second(t, q, v, &mut first, &mut point.second);
             point.p = first.z;
             for a in 0..N {
                 point.force[a] = first.q[a] + first.force[a];
             }
         } else {
-            let view = lagrangian_view_from(self.model, t, &q, &v, &self.momenta[l])?;
+            let view = lagrangian_view_from(self.model, t, q, v, &self.momenta[l])?;
             self.momenta[l] = view.p;
             point.p = view.p;
             point.second = view.second;
@@ -352,16 +321,7 @@ where
     }
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
-        let position = relative(self.span.h, &self.span.start.q, x, step);
-        // The momentum at the end is as accurate as the velocities, whatever the step. The rest of an increment affects
-        // it through the forces only, hence the factor.
-        let velocity = 0.25 * relative(1.0, &[], x, step);
-        let relative = if (velocity + position).is_nan() {
-            f64::NAN
-        } else {
-            velocity.max(position)
-        };
-        Increment { relative, position }
+        self.span.measure_rates(x, step)
     }
 
     fn finish(&mut self, x: &[f64], scratch: &mut [f64]) -> Result<(), StepError> {

@@ -232,7 +232,7 @@ where
             row[a] -= kick[a];
         }
     }
-    let (t, q, v) = form.end_place(x);
+    let (t, q, v) = form.constraints.end_place(x);
     let (time, q_dual) = moving(direction, 1.0, t, &q, scheme.advance, rates);
     let time = time.by_parameter(parameter);
     let (momentum, _) = explicit(form.inner.model, time, &q_dual, &v, &span.start.p)?;

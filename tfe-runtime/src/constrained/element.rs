@@ -11,6 +11,7 @@
 //! only add to the momenta and forces at its points. Dependent holonomic rows are combined ([`Rows::combine`], T-118);
 //! dependent velocity rows are replaced by μ = 0.
 
+use crate::constrained::constrains::Constrains;
 use crate::constrained::layout::Layout;
 use crate::constrained::own::violated;
 use crate::constrained::residual::relative_residual;
@@ -19,17 +20,15 @@ use crate::control::START_TOLERANCE;
 use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::{ConstraintError, StepError};
 use crate::legendre::{conjugate, lagrangian_view_from};
-use crate::model::{Constraint, First, Form, Model, Second, State};
+use crate::model::{Constraint, First, Model, Second, State};
 use crate::scheme::{MAX_RATES, SchemeRef};
 use crate::statistics::Statistics;
-use crate::velocity_form::{PointDerivatives, PointTangent, VelocityForm};
+use crate::velocity_form::{PointDerivatives, VelocityForm};
 
 pub(crate) struct ConstrainedForm<'a, M, const N: usize> {
     /// The element without constraints; its `momenta` become L_v at the points, its `forces` all forces there.
     pub(crate) inner: VelocityForm<'a, M, N>,
     pub(crate) constraints: ElementConstraints<'a, N>,
-    /// The contribution of impulses to the momentum at the end.
-    pub(crate) impulse: [f64; N],
 }
 
 /// The constraints as they are declared.
@@ -39,12 +38,25 @@ pub(super) type Declared = &'static [Constraint];
 /// model, so that this code is compiled once for a number of coordinates.
 pub(crate) struct ElementConstraints<'a, const N: usize> {
     pub(super) scheme: SchemeRef<'a>,
-    /// The length of the element.
-    pub(super) h: f64,
+    pub(super) span: Span<'a, N>,
     pub(crate) layout: Layout,
     pub(crate) rows: Rows<'a, N>,
     /// One for each constraint that is in use.
     pub(crate) active: &'a [usize],
+    /// The contribution of impulses to the momentum at the end.
+    pub(super) impulse: [f64; N],
+    /// Whether constraints on velocities act at the points.
+    pub(super) on_velocities: bool,
+    /// Whether holonomic constraints act at the points.
+    pub(super) on_positions: bool,
+}
+
+/// A point of the element.
+pub(super) struct Place<const N: usize> {
+    pub(super) l: usize,
+    pub(super) t: f64,
+    pub(super) q: [f64; N],
+    pub(super) v: [f64; N],
 }
 
 /// The end of the element as it follows from the unknowns.
@@ -64,6 +76,22 @@ pub(crate) struct Derivatives<'a> {
     pub(crate) by_start: &'a mut [f64],
 }
 
+/// The residual and, on request, its derivatives.
+pub(super) struct Output<'a> {
+    pub(super) residual: &'a mut [f64],
+    pub(super) derivatives: Option<Derivatives<'a>>,
+}
+
+impl Output<'_> {
+    fn clear(&mut self) {
+        self.residual.fill(0.0);
+        if let Some(derivatives) = &mut self.derivatives {
+            derivatives.tangent.fill(0.0);
+            derivatives.by_start.fill(0.0);
+        }
+    }
+}
+
 /// P_j′(2c − 1), j = 0 … s − 1.
 pub(crate) fn slopes(node: f64, degree: usize) -> [f64; MAX_RATES] {
     let x = 2.0 * node - 1.0;
@@ -75,6 +103,32 @@ pub(crate) fn slopes(node: f64, degree: usize) -> [f64; MAX_RATES] {
         values = [values[1], next];
     }
     slopes
+}
+
+impl<'a, const N: usize> ElementConstraints<'a, N> {
+    /// With the constraints that `active` marks.
+    fn new(
+        declared: Declared,
+        (scheme, span): (SchemeRef<'a>, Span<'a, N>),
+        layout: Layout,
+        rows: Rows<'a, N>,
+        active: &'a [usize],
+        impulse: [f64; N],
+    ) -> Self {
+        let mut constraints = Self {
+            scheme,
+            span,
+            layout,
+            rows,
+            active,
+            impulse,
+            on_velocities: false,
+            on_positions: false,
+        };
+        constraints.on_velocities = constraints.has(declared, false);
+        constraints.on_positions = constraints.has(declared, true) && layout.degree() > 1;
+        constraints
+    }
 }
 
 impl<const N: usize> ElementConstraints<'_, N> {
@@ -112,7 +166,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
                 let coefficients = (1..self.layout.degree()).map(|j| x[self.layout.inside(j, c)]);
                 coefficients.zip(&slopes[1..]).map(|(m, p)| m * p).sum()
             } else {
-                self.h * x[self.layout.inside(l, c)]
+                self.span.h * x[self.layout.inside(l, c)]
             };
         }
     }
@@ -120,7 +174,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
     /// Sets the multipliers of the node at the end, or those that change the momentum at the start.
     #[inline]
     pub(crate) fn set_node_mu(&mut self, declared: Declared, x: &[f64], at_start: bool) {
-        let h = self.h;
+        let h = self.span.h;
         for (c, constraint) in declared.iter().enumerate() {
             let node = h * x[self.layout.node(c)];
             self.rows.mu[c] = match (
@@ -137,12 +191,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
     }
 
     /// The equations of constraints that are not in use: their multipliers are zero.
-    fn hold_dependent(
-        &self,
-        x: &[f64],
-        residual: &mut [f64],
-        mut derivatives: Option<Derivatives<'_>>,
-    ) {
+    pub(super) fn hold_dependent(&self, x: &[f64], output: &mut Output<'_>) {
         let size = self.layout.size();
         for (c, _) in self
             .active
@@ -152,12 +201,100 @@ impl<const N: usize> ElementConstraints<'_, N> {
         {
             let inside = (0..self.layout.degree()).map(|j| self.layout.inside(j, c));
             for at in inside.chain([self.layout.node(c)]) {
-                residual[at] = x[at];
-                if let Some(derivatives) = &mut derivatives {
+                output.residual[at] = x[at];
+                if let Some(derivatives) = &mut output.derivatives {
                     derivatives.tangent[at * size + at] = 1.0;
                 }
             }
         }
+    }
+}
+
+/// The element as it follows from the unknowns x.
+impl<const N: usize> ElementConstraints<'_, N> {
+    /// The rates at the points.
+    fn rates<'x>(&self, x: &'x [f64]) -> &'x [[f64; N]] {
+        x[..self.layout.rates()].as_chunks().0
+    }
+
+    /// The place of a point.
+    fn place(&self, l: usize, x: &[f64]) -> Place<N> {
+        let (t, q, v) = self.span.place(&self.scheme, l, self.rates(x));
+        Place { l, t, q, v }
+    }
+
+    /// Time, coordinates and velocity at the end.
+    pub(crate) fn end_place(&self, x: &[f64]) -> (f64, [f64; N], [f64; N]) {
+        let (scheme, span) = (&self.scheme, &self.span);
+        let rate = weighted(scheme.advance, scheme.advance_low, self.rates(x));
+        let q = moved(&span.start.q, &span.low.q, span.h, &rate);
+        let mut v = [0.0; N];
+        v.copy_from_slice(&x[self.layout.end(0)..self.layout.node(0)]);
+        (span.t + span.h, q, v)
+    }
+
+    /// The rounding error of the coordinates q at the end; that of the momenta is not known.
+    fn end_low(&self, x: &[f64], q: &[f64; N]) -> State<N> {
+        let (scheme, span) = (&self.scheme, &self.span);
+        let rate = weighted(scheme.advance, scheme.advance_low, self.rates(x));
+        let mut low = State::ZERO;
+        for a in 0..N {
+            let increment = span.h * rate[a] + span.low.q[a];
+            let part = q[a] - span.start.q[a];
+            low.q[a] = (span.start.q[a] - (q[a] - part)) + (increment - part);
+        }
+        low
+    }
+
+    /// Checks that all constraints hold at the end, including those that were omitted as dependent. These are not
+    /// solved for, so that they are also compared with the size of their own terms.
+    pub(crate) fn check_end(
+        &mut self,
+        model: &dyn Constrains<N>,
+        x: &[f64],
+        tolerance: f64,
+    ) -> Result<(), StepError> {
+        let (t, q, v) = self.end_place(x);
+        let (declared, h) = (model.declared(), self.span.h);
+        self.rows.evaluate_declared(model, t, &q);
+        let rows = &self.rows;
+        let refused = |c: usize, residual: f64| {
+            Err(ConstraintError::Dependent {
+                constraint: declared[c].name,
+                residual,
+            }
+            .into())
+        };
+        for c in 0..declared.len() {
+            let (position, velocity) = relative_residual(rows, c, &q, &v, h);
+            for residual in [position, velocity] {
+                if !(residual <= START_TOLERANCE) {
+                    return refused(c, residual);
+                }
+            }
+        }
+        if self.active.iter().all(|mark| *mark == 1) {
+            return Ok(());
+        }
+        match violated(model, t, (&q, &v), (h, tolerance), Some(rows)) {
+            Some((c, _, residual)) => refused(c, residual),
+            None => Ok(()),
+        }
+    }
+
+    /// The size of an increment of x, relative to the state.
+    fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
+        let rates = self.layout.rates();
+        let end = self.layout.end(0)..self.layout.node(0);
+        let inner = self.span.measure_rates(&x[..rates], &step[..rates]);
+        let end = 0.25 * relative(1.0, &[], &x[end.clone()], &step[end]);
+        // `f64::max` would ignore a NaN.
+        let relative = if end > inner.relative || end.is_nan() {
+            end
+        } else {
+            inner.relative
+        };
+        Increment { relative, ..inner }
     }
 }
 
@@ -173,108 +310,48 @@ where
         active: &'a [usize],
         impulse: [f64; N],
     ) -> Self {
-        let constraints = ElementConstraints {
-            scheme: inner.scheme,
-            h: inner.span.h,
-            layout,
-            rows,
-            active,
-        };
+        let element = (inner.scheme, inner.span);
         Self {
             inner,
-            constraints,
-            impulse,
+            constraints: ElementConstraints::new(
+                M::CONSTRAINTS,
+                element,
+                layout,
+                rows,
+                active,
+                impulse,
+            ),
         }
-    }
-
-    /// Time, coordinates and velocity at the end.
-    pub(crate) fn end_place(&self, x: &[f64]) -> (f64, [f64; N], [f64; N]) {
-        let span = &self.inner.span;
-        let scheme = &self.inner.scheme;
-        let rates = x[..self.constraints.layout.rates()].as_chunks::<N>().0;
-        let rate = weighted(scheme.advance, scheme.advance_low, rates);
-        let q = moved(&span.start.q, &span.low.q, span.h, &rate);
-        let mut v = [0.0; N];
-        v.copy_from_slice(&x[self.constraints.layout.end(0)..self.constraints.layout.node(0)]);
-        (span.t + span.h, q, v)
     }
 
     /// L_v at the end, and on request second derivatives.
     pub(crate) fn end(&self, x: &[f64], with_second: bool) -> Result<End<N>, StepError> {
-        let (t, q, v) = self.end_place(x);
+        let (t, q, v) = self.constraints.end_place(x);
         let model = self.inner.model;
         let guess = &self.inner.span.start.p;
         let mut second = Second::ZERO;
-        let p = match (M::FORM, with_second) {
-            (Form::Lagrangian, false) => {
-                let mut first = First::ZERO;
-                model.first(t, &q, &v, &mut first);
-                first.z
-            }
-            (Form::Lagrangian, true) => {
-                let mut first = First::ZERO;
+        let p = if const { M::FORM.is_lagrangian() } {
+            let mut first = First::ZERO;
+            if with_second {
                 model.second(t, &q, &v, &mut first, &mut second);
-                first.z
+            } else {
+                model.first(t, &q, &v, &mut first);
             }
-            (Form::Hamiltonian, false) => conjugate(model, t, &q, &v, guess)?,
-            (Form::Hamiltonian, true) => {
-                let view = lagrangian_view_from(model, t, &q, &v, guess)?;
-                second = view.second;
-                view.p
-            }
+            first.z
+        } else if with_second {
+            let view = lagrangian_view_from(model, t, &q, &v, guess)?;
+            second = view.second;
+            view.p
+        } else {
+            conjugate(model, t, &q, &v, guess)?
         };
         Ok(End { t, q, v, p, second })
     }
 
     /// The state at the end and its rounding error.
     pub(crate) fn end_state(&self, x: &[f64]) -> Result<(State<N>, State<N>), StepError> {
-        let end = self.end(x, false)?;
-        let span = &self.inner.span;
-        let rates = x[..self.constraints.layout.rates()].as_chunks::<N>().0;
-        let rate = weighted(
-            self.inner.scheme.advance,
-            self.inner.scheme.advance_low,
-            rates,
-        );
-        let mut low = State::ZERO;
-        for a in 0..N {
-            let increment = span.h * rate[a] + span.low.q[a];
-            let part = end.q[a] - span.start.q[a];
-            low.q[a] = (span.start.q[a] - (end.q[a] - part)) + (increment - part);
-        }
-        Ok((State { q: end.q, p: end.p }, low))
-    }
-
-    /// Checks that all constraints hold at the end, including those that were omitted as dependent. These are not
-    /// solved for, so that they are also compared with the size of their own terms.
-    pub(crate) fn check_end(&mut self, x: &[f64], tolerance: f64) -> Result<(), StepError> {
-        let (t, q, v) = self.end_place(x);
-        self.constraints
-            .rows
-            .evaluate_declared(self.inner.model, t, &q);
-        let (rows, h) = (&self.constraints.rows, self.inner.span.h);
-        let refused = |c: usize, residual: f64| {
-            Err(ConstraintError::Dependent {
-                constraint: M::CONSTRAINTS[c].name,
-                residual,
-            }
-            .into())
-        };
-        for c in 0..M::CONSTRAINTS.len() {
-            let (position, velocity) = relative_residual(rows, c, &q, &v, h);
-            for residual in [position, velocity] {
-                if !(residual <= START_TOLERANCE) {
-                    return refused(c, residual);
-                }
-            }
-        }
-        if self.constraints.active.iter().all(|mark| *mark == 1) {
-            return Ok(());
-        }
-        match violated(self.inner.model, t, (&q, &v), (h, tolerance), Some(rows)) {
-            Some((c, _, residual)) => refused(c, residual),
-            None => Ok(()),
-        }
+        let End { q, p, .. } = self.end(x, false)?;
+        Ok((State { q, p }, self.constraints.end_low(x, &q)))
     }
 
     /// The residual at x, and on request its derivative.
@@ -282,154 +359,33 @@ where
         &mut self,
         x: &[f64],
         residual: &mut [f64],
-        mut derivatives: Option<Derivatives<'_>>,
+        derivatives: Option<Derivatives<'_>>,
     ) -> Result<(), StepError> {
-        let layout = self.constraints.layout;
-        let (scheme, h) = (self.inner.scheme, self.inner.span.h);
-        let (points, unknowns) = (scheme.points(), scheme.unknowns());
-        let rates = x[..layout.rates()].as_chunks::<N>().0;
-        let velocities = self.constraints.has(M::CONSTRAINTS, false);
-        let positions = self.constraints.has(M::CONSTRAINTS, true) && layout.degree() > 1;
-        residual.fill(0.0);
-        if let Some(derivatives) = &mut derivatives {
-            derivatives.tangent.fill(0.0);
-            derivatives.by_start.fill(0.0);
-        }
+        let with_second = derivatives.is_some();
+        let mut output = Output {
+            residual,
+            derivatives,
+        };
+        output.clear();
         let mut point = PointDerivatives::ZERO;
-        for l in 0..points {
-            let (t, q, v) = self.inner.place(l, rates);
-            if derivatives.is_some() {
-                self.inner.derivatives(l, rates, &mut point)?;
+        for l in 0..self.inner.scheme.points() {
+            let place = self.constraints.place(l, x);
+            let at = (place.t, &place.q, &place.v);
+            if with_second {
+                self.inner.derivatives_at(l, at, &mut point)?;
             } else {
-                self.inner.values(l, rates, &mut point)?;
+                self.inner.values_at(l, at, &mut point)?;
             }
             self.inner.momenta[l] = point.p;
-            let mut by = PointTangent::of(h, &point.second);
-            self.constraints.rows.evaluate(self.inner.model, t, &q);
-            let slopes = slopes(scheme.nodes[l], layout.degree());
-            if velocities {
-                self.constraints
-                    .set_mu(M::CONSTRAINTS, l, x, &slopes, false);
-                let bend = self
-                    .constraints
-                    .rows
-                    .differentiate(self.inner.model, t, &q, &v);
-                let momentum = transposed(self.constraints.rows.rows, self.constraints.rows.mu);
-                let force = transposed(self.constraints.rows.rates, self.constraints.rows.mu);
-                for a in 0..N {
-                    point.p[a] += momentum[a];
-                    point.force[a] += force[a];
-                    for b in 0..N {
-                        by.momentum_q[a][b] += h * bend.bend[a][b];
-                        by.force_q[a][b] += h * bend.rate_q[a][b];
-                        by.force_v[a][b] += bend.rate_v[a][b];
-                    }
-                }
-            }
-            if positions {
-                self.constraints.set_mu(M::CONSTRAINTS, l, x, &slopes, true);
-                let force = transposed(self.constraints.rows.rows, self.constraints.rows.mu);
-                for a in 0..N {
-                    point.force[a] -= force[a];
-                }
-                if derivatives.is_some() {
-                    let bend = self
-                        .constraints
-                        .rows
-                        .differentiate(self.inner.model, t, &q, &v);
-                    for a in 0..N {
-                        for b in 0..N {
-                            by.force_q[a][b] -= h * bend.bend[a][b];
-                        }
-                    }
-                }
-            }
-            self.inner.forces[l] = point.force;
-            for i in 0..unknowns {
-                let weight = scheme.momentum[i * points + l];
-                for a in 0..N {
-                    residual[i * N + a] += weight * point.p[a];
-                }
-            }
-            for (c, holonomic) in self.constraints.active(M::CONSTRAINTS) {
-                if holonomic {
-                    for j in 1..layout.degree() {
-                        residual[layout.inside(j, c)] +=
-                            scheme.weights[l] * slopes[j] * self.constraints.rows.values[c] / h;
-                    }
-                } else {
-                    residual[layout.inside(l, c)] = self.constraints.rows.psi(c, &v);
-                }
-            }
-            if let Some(Derivatives { tangent, by_start }) = &mut derivatives {
-                self.constraints.add_element(l, &by, tangent);
-                self.constraints
-                    .add_point(M::CONSTRAINTS, l, &slopes, tangent);
-                if !by_start.is_empty() {
-                    self.constraints
-                        .add_start(M::CONSTRAINTS, l, &by, &slopes, by_start);
-                }
-            }
-        }
-        let rows = residual[..layout.rates()].as_chunks_mut::<N>().0;
-        self.inner.subtract_impulse(rows);
-        self.constraints.set_node_mu(M::CONSTRAINTS, x, true);
-        let kick = transposed(self.constraints.rows.start, self.constraints.rows.mu);
-        for row in rows {
-            for a in 0..N {
-                row[a] -= kick[a];
-            }
-        }
-        if let Some(Derivatives { by_start, .. }) = &mut derivatives
-            && !by_start.is_empty()
-        {
-            let Span { t, start, .. } = self.inner.span;
-            let bend =
-                self.constraints
-                    .rows
-                    .differentiate(self.inner.model, t, &start.q, &[0.0; N]);
-            for row in (0..unknowns * N).chain(layout.end(0)..layout.node(0)) {
-                let a = if row < layout.rates() {
-                    row % N
-                } else {
-                    row - layout.end(0)
-                };
-                for b in 0..N {
-                    by_start[row * N + b] -= bend.bend[a][b];
-                }
-            }
-        }
-        let end = self.end(x, derivatives.is_some())?;
-        self.constraints
-            .rows
-            .evaluate(self.inner.model, end.t, &end.q);
-        self.constraints.set_node_mu(M::CONSTRAINTS, x, false);
-        let reaction = transposed(self.constraints.rows.rows, self.constraints.rows.mu);
-        let force = weighted(scheme.weights, scheme.weights_low, self.inner.forces);
-        let span = &self.inner.span;
-        for a in 0..N {
-            let impulse = h * force[a] + (span.low.p[a] + self.impulse[a] + kick[a]);
-            residual[layout.end(a)] = (end.p[a] - span.start.p[a]) + (reaction[a] - impulse);
-        }
-        for (c, holonomic) in self.constraints.active(M::CONSTRAINTS) {
-            residual[layout.node(c)] = self.constraints.rows.psi(c, &end.v);
-            if holonomic {
-                residual[layout.inside(0, c)] = self.constraints.rows.values[c] / h;
-            }
-        }
-        if let Some(Derivatives { tangent, by_start }) = &mut derivatives {
-            let bend = self
-                .constraints
-                .rows
-                .differentiate(self.inner.model, end.t, &end.q, &end.v);
+            let model = self.inner.model;
             self.constraints
-                .add_ends(M::CONSTRAINTS, &end, &bend, tangent);
-            if !by_start.is_empty() {
-                self.constraints
-                    .add_end_by_start(M::CONSTRAINTS, &end, &bend, by_start);
-            }
+                .add_at(model, &place, x, &mut point, &mut output);
+            self.inner.forces[l] = point.force;
         }
-        self.constraints.hold_dependent(x, residual, derivatives);
+        let end = self.end(x, with_second)?;
+        let (model, forces) = (self.inner.model, &*self.inner.forces);
+        self.constraints
+            .add_nodes(model, forces, x, &end, &mut output);
         self.inner.statistics.residual_evaluations += 1;
         Ok(())
     }
@@ -462,19 +418,7 @@ where
     }
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
-        let (rates, end) = (
-            self.constraints.layout.rates(),
-            self.constraints.layout.end(0)..self.constraints.layout.node(0),
-        );
-        let inner = self.inner.measure(&x[..rates], &step[..rates]);
-        let end = 0.25 * relative(1.0, &[], &x[end.clone()], &step[end]);
-        // `f64::max` would ignore a NaN.
-        let relative = if end > inner.relative || end.is_nan() {
-            end
-        } else {
-            inner.relative
-        };
-        Increment { relative, ..inner }
+        self.constraints.measure(x, step)
     }
 
     fn finish(&mut self, _: &[f64], _: &mut [f64]) -> Result<(), StepError> {
@@ -485,17 +429,4 @@ where
     fn statistics(&mut self) -> &mut Statistics {
         self.inner.statistics
     }
-}
-
-/// Σ rows_c μ_c
-fn transposed<const N: usize>(rows: &[[f64; N]], mu: &[f64]) -> [f64; N] {
-    let mut sum = [0.0; N];
-    for (row, mu) in rows.iter().zip(mu) {
-        if *mu != 0.0 {
-            for a in 0..N {
-                sum[a] += row[a] * mu;
-            }
-        }
-    }
-    sum
 }

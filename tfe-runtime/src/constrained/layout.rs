@@ -1,8 +1,8 @@
 //! The order of the unknowns of an element with constraints.
 
 use crate::element::Element;
-
-use crate::model::Model;
+use crate::error::ConstraintError;
+use crate::model::Constraint;
 
 /// The unknowns and, in the same order, the equations: rates, interior multipliers, velocity at the end, multipliers of
 /// the nodes.
@@ -66,15 +66,14 @@ impl Layout {
 
     /// Sets the multipliers to those of constant reactions λ, μ = −λ t; zero where the reactions are unknown.
     #[cfg(feature = "alloc")]
-    pub(crate) fn guess<M, const N: usize>(
+    pub(crate) fn guess(
         &self,
+        declared: &[Constraint],
         nodes: &[f64],
         reactions: Option<&[f64]>,
         unknowns: &mut [f64],
-    ) where
-        M: Model<N>,
-    {
-        for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+    ) {
+        for (c, constraint) in declared.iter().enumerate() {
             let lambda = reactions.map_or(0.0, |reactions| reactions[c]);
             let lambda = if lambda.is_finite() { lambda } else { 0.0 };
             for j in 0..self.degree {
@@ -100,15 +99,18 @@ impl Layout {
     }
 }
 
-/// The first constraint of a model that the element cannot enforce.
-pub(crate) fn refused<M, const N: usize>(element: &Element) -> Option<&'static str>
-where
-    M: Model<N>,
-{
-    M::CONSTRAINTS
-        .iter()
-        .find(|constraint| !element.holds(constraint.kind.is_holonomic()))
-        .map(|constraint| constraint.name)
+/// Refuses an element that cannot enforce one of the constraints.
+pub(crate) fn check_element(
+    declared: &'static [Constraint],
+    element: Element,
+) -> Result<(), ConstraintError> {
+    match (declared.iter()).find(|constraint| !element.holds(constraint.kind.is_holonomic())) {
+        Some(constraint) => Err(ConstraintError::Element {
+            element,
+            constraint: constraint.name,
+        }),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]

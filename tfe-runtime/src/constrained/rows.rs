@@ -122,10 +122,7 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 
     /// Evaluates A, a and φ.
-    pub(crate) fn evaluate<C>(&mut self, model: &C, t: f64, q: &[f64; N])
-    where
-        C: Constrains<N> + ?Sized,
-    {
+    pub(crate) fn evaluate(&mut self, model: &dyn Constrains<N>, t: f64, q: &[f64; N]) {
         self.evaluate_declared(model, t, q);
         if self.is_combined {
             self.combine_evaluated();
@@ -151,10 +148,7 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 
     /// Evaluates the constraints as declared, without combining them.
-    pub(crate) fn evaluate_declared<C>(&mut self, model: &C, t: f64, q: &[f64; N])
-    where
-        C: Constrains<N> + ?Sized,
-    {
+    pub(crate) fn evaluate_declared(&mut self, model: &dyn Constrains<N>, t: f64, q: &[f64; N]) {
         if self.is_combined {
             // Kernels write only what can be non-zero.
             self.rows.fill([0.0; N]);
@@ -162,6 +156,11 @@ impl<'a, const N: usize> Rows<'a, N> {
             self.values.fill(0.0);
         }
         model.values_at(t, q, self.rows, (self.drift, self.values));
+    }
+
+    /// Whether constraints depend on the time, so that they do work.
+    pub(crate) fn drifts(&self) -> bool {
+        !self.drift.iter().all(|a| *a == 0.0)
     }
 
     /// Whether rows are combinations.
@@ -176,16 +175,13 @@ impl<'a, const N: usize> Rows<'a, N> {
     }
 
     /// Evaluates ψ_q and Ȧ, and the second derivatives with the multipliers `mu`.
-    pub(crate) fn differentiate<C>(
+    pub(crate) fn differentiate(
         &mut self,
-        model: &C,
+        model: &dyn Constrains<N>,
         t: f64,
         q: &[f64; N],
         v: &[f64; N],
-    ) -> Bend<N>
-    where
-        C: Constrains<N> + ?Sized,
-    {
+    ) -> Bend<N> {
         let zero = [[0.0; N]; N];
         if self.is_combined {
             self.declare_multipliers();

@@ -13,7 +13,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         slopes: &[f64],
         tangent: &mut [f64],
     ) {
-        let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
+        let (scheme, h, size) = (&self.scheme, self.span.h, self.layout.size());
         let (points, unknowns) = (scheme.points(), scheme.unknowns());
         let (weight, position) = (
             scheme.weights[l],
@@ -63,7 +63,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         bend: &Bend<N>,
         tangent: &mut [f64],
     ) {
-        let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
+        let (scheme, h, size) = (&self.scheme, self.span.h, self.layout.size());
         let layout = &self.layout;
         for a in 0..N {
             let row = &mut tangent[layout.end(a) * size..][..size];
@@ -104,7 +104,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
 
     /// Adds the contributions of momentum and force at a point to the tangent.
     pub(super) fn add_element(&self, l: usize, by: &PointTangent<N>, tangent: &mut [f64]) {
-        let (scheme, h, size) = (&self.scheme, self.h, self.layout.size());
+        let (scheme, h, size) = (&self.scheme, self.span.h, self.layout.size());
         let (points, rates) = (scheme.points(), self.layout.rates());
         for (i, rows) in tangent[..rates * size]
             .chunks_exact_mut(N * size)
@@ -131,7 +131,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         slopes: &[f64],
         by_start: &mut [f64],
     ) {
-        let (scheme, h) = (&self.scheme, self.h);
+        let (scheme, h) = (&self.scheme, self.span.h);
         let (points, weight) = (scheme.points(), scheme.weights[l]);
         for a in 0..N {
             for i in 0..scheme.unknowns() {
@@ -177,7 +177,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
             for (c, holonomic) in self.active(declared) {
                 by_start[layout.node(c) * N + b] = self.rows.psi_q[c][b];
                 if holonomic {
-                    by_start[layout.inside(0, c) * N + b] = self.rows.rows[c][b] / self.h;
+                    by_start[layout.inside(0, c) * N + b] = self.rows.rows[c][b] / self.span.h;
                 }
             }
         }
