@@ -343,56 +343,108 @@ where
 {
     const MOST: u32 = 60;
     let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
-    let mut z = *guess;
-    let mut last = f64::INFINITY;
+    let mut search = Search::new(guess, target);
     for iteration in 0..MOST {
-        model.first_and_mass(t, q, &z, &mut first, &mut zz);
-        let mut step = [0.0; N];
-        for a in 0..N {
-            step[a] = first.z[a] - target[a];
-        }
-        let residual = largest(&step);
-        if !residual.is_finite() {
-            return Err(LegendreError::NonFinite);
-        }
-        // The residual of a regular problem cannot be smaller than the rounding error of ∂/∂z; this limit is reached
-        // once the residual is small relative to its terms and no longer decreases.
-        let scale = largest(&first.z).max(largest(target));
-        if residual == 0.0 || (residual >= 0.5 * last && residual <= 64.0 * f64::EPSILON * scale) {
-            return Ok(z);
-        }
-        last = residual;
-        solve(&zz, &mut step).map_err(|singular| LegendreError::Singular {
-            coordinate: singular.column,
-        })?;
-        let start = z;
-        advance(&mut z, &start, &step, 1.0);
+        model.first_and_mass(t, q, &search.z, &mut first, &mut zz);
         // For a quadratic function one iteration suffices; a second one removes the rounding error of a long first one.
         let enough = match (M::FACTS.quadratic_in_z, iteration) {
             (true, 0) => 1e-6,
             (true, _) => f64::INFINITY,
             (false, _) => f64::EPSILON,
         };
-        if largest(&step) <= enough * largest(&z) {
-            return finite(z);
+        if search.ends(&first.z, &zz, enough)? {
+            return Ok(search.z);
         }
         if const { M::FACTS.quadratic_in_z } {
             continue;
         }
         // Damped Newton steps, for functions such as −m√(1 − v²) that are undefined where a full step may lead.
         let mut fraction = 1.0;
-        while residual > 1e-8 * scale
+        while search.residual > 1e-8 * search.scale
             && fraction > 1e-6
-            && !improves(distance(&derivative(model, t, q, &z), target), residual)
+            && !search.is_improved(&derivative(model, t, q, &search.z))
         {
             fraction *= 0.5;
-            advance(&mut z, &start, &step, fraction);
+            search.advance(fraction);
         }
     }
     Err(LegendreError::Stalled {
         iterations: MOST,
-        residual: last,
+        residual: search.residual,
     })
+}
+
+/// Newton's method for the z for which ∂/∂z equals a target.
+struct Search<'a, const N: usize> {
+    target: &'a [f64; N],
+    z: [f64; N],
+    /// The z from which the last step was made, and that step.
+    start: [f64; N],
+    step: [f64; N],
+    /// The residual there, and the size of its terms.
+    residual: f64,
+    scale: f64,
+}
+
+impl<'a, const N: usize> Search<'a, N> {
+    fn new(guess: &[f64; N], target: &'a [f64; N]) -> Self {
+        Self {
+            target,
+            z: *guess,
+            start: *guess,
+            step: [0.0; N],
+            residual: f64::INFINITY,
+            scale: 0.0,
+        }
+    }
+
+    /// Makes a step, given ∂/∂z and ∂²/∂z∂z. Whether z is the solution: before the step, or after a step of at most the
+    /// fraction `enough` of z.
+    fn ends(
+        &mut self,
+        by_z: &[f64; N],
+        zz: &[[f64; N]; N],
+        enough: f64,
+    ) -> Result<bool, LegendreError> {
+        for a in 0..N {
+            self.step[a] = by_z[a] - self.target[a];
+        }
+        let residual = largest(&self.step);
+        if !residual.is_finite() {
+            return Err(LegendreError::NonFinite);
+        }
+        // The residual of a regular problem cannot be smaller than the rounding error of ∂/∂z; this limit is reached
+        // once the residual is small relative to its terms and no longer decreases.
+        self.scale = largest(by_z).max(largest(self.target));
+        if residual == 0.0
+            || (residual >= 0.5 * self.residual && residual <= 64.0 * f64::EPSILON * self.scale)
+        {
+            return Ok(true);
+        }
+        self.residual = residual;
+        solve(zz, &mut self.step).map_err(|singular| LegendreError::Singular {
+            coordinate: singular.column,
+        })?;
+        self.start = self.z;
+        self.advance(1.0);
+        if !(largest(&self.step) <= enough * largest(&self.z)) {
+            return Ok(false);
+        }
+        finite(self.z)?;
+        Ok(true)
+    }
+
+    /// Makes a fraction of the step.
+    fn advance(&mut self, fraction: f64) {
+        for a in 0..N {
+            self.z[a] = self.start[a] - fraction * self.step[a];
+        }
+    }
+
+    /// Whether the residual is less with this ∂/∂z than it was before the step, and not NaN.
+    fn is_improved(&self, by_z: &[f64; N]) -> bool {
+        distance(by_z, self.target) < self.residual
+    }
 }
 
 /// Solves matrix · x = vector in place. With many coordinates the matrix is mostly diagonal, and then one division for
@@ -422,17 +474,6 @@ fn is_diagonal<const N: usize>(matrix: &[[f64; N]; N]) -> bool {
         }
     }
     true
-}
-
-fn advance<const N: usize>(z: &mut [f64; N], start: &[f64; N], step: &[f64; N], fraction: f64) {
-    for a in 0..N {
-        z[a] = start[a] - fraction * step[a];
-    }
-}
-
-/// Whether `new` is less than `old`, and not NaN.
-fn improves(new: f64, old: f64) -> bool {
-    new < old
 }
 
 fn dot<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {

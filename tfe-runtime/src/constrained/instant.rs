@@ -6,7 +6,7 @@ use crate::constrained::rows::{dot, norm, rows_len, scaled, scaled_norm};
 use crate::constrained::states::chosen;
 use crate::dual::{Dual, duals};
 use crate::error::{ConstraintError, StepError};
-use crate::legendre::lagrangian_view_from;
+use crate::legendre::{LagrangianView, lagrangian_view_from};
 use crate::lu;
 use crate::model::{Model, Second, State};
 use alloc::vec;
@@ -78,16 +78,26 @@ where
     M: Model<N>,
 {
     let view = lagrangian_view_from(model, t, &state.q, v, &state.p)?;
-    let gradients = gradients_with(view.second, model, (t, &state.q, v));
-    let moving = duals(&state.q, v);
-    let (momentum, _) = explicit(model, Dual::new(t, 1.0), &moving, v, &state.p)?;
+    let (time, moving) = (Dual::new(t, 1.0), duals(&state.q, v));
+    let (momentum, _) = explicit(model, time, &moving, v, &state.p)?;
     let mut along = DualRows::<N>::new(M::CONSTRAINTS.len());
-    along.evaluate(model, Dual::new(t, 1.0), &moving, v);
+    along.evaluate(model, time, &moving, v);
+    reactions_along(model, (t, &state.q, v), (&view, &momentum), &along)
+}
+
+/// The reactions in a motion along which L_v and the constraints change so at a constant velocity.
+fn reactions_along<const N: usize>(
+    model: &dyn Constrains<N>,
+    (t, q, v): (f64, &[f64; N], &[f64; N]),
+    (view, momentum): (&LagrangianView<N>, &[f64; N]),
+    along: &DualRows<N>,
+) -> Result<Vec<f64>, StepError> {
+    let gradients = gradients_with(view.second, model, (t, q, v));
     let mut force = [0.0; N];
     for a in 0..N {
         force[a] = view.first.q[a] + view.first.force[a] - momentum[a];
     }
-    balance(&gradients, &force, &along, v)
+    balance(&gradients, &force, along, v)
 }
 
 /// The reactions that balance a force except for the part that accelerates.
