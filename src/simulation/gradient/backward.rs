@@ -58,6 +58,11 @@ impl<'a, M: family::Model> Backward<'a, M> {
         (motion, trail): (&Motion<0, RunTimeLength>, &Trail<'_, M>),
         seen: &Seen,
     ) -> Result<(), RunErrorKind> {
+        // The elements behind such an event belong to another model.
+        let is_set = |(_, record): &(usize, Between<'_, M>)| matches!(record, Between::Set(_));
+        if trail.between.iter().any(is_set) {
+            return Err(RunErrorKind::SetUnsupported { call: CALL });
+        }
         let view: View<'_, M, 0, RunTimeLength> = View::new(self.model, seen, &motion.last().v);
         let last = motion.states().len() - 1;
         // The time of the last node is that of the event that has stopped the run.
@@ -161,11 +166,8 @@ impl<M: family::Model> Pass<'_, '_, M> {
                     Between::Node(number) => self.look(*number)?,
                     Between::Kicked(kicked) => self.to.adjoint.kick(kicked.t, &kicked.with)?,
                     Between::Acted => self.pass_event(&mut records)?,
-                    Between::Set(_) => {
-                        return Err(RunErrorKind::SetUnsupported { call: CALL }.into());
-                    }
-                    // Passed with the record of its action.
-                    Between::Cut(_) => {}
+                    // A cut is passed with the record of its action; a setting is refused before.
+                    Between::Cut(_) | Between::Set(_) => {}
                 }
             }
             let Some(left) = self.left.checked_sub(1) else {
