@@ -9,9 +9,12 @@ use crate::length::Length;
 use std::sync::Arc;
 use tfe_runtime::Share;
 
-// The bounds are those of the methods: so the message of a model without inputs is that of the trait, and not that there
-// is no such method.
-impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
+impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
+where
+    M: Drivable<'m, N, L, Declaring: 'm>,
+    Driven<'m, M::Declaring, L>: Simulated<N, L> + Send + Sync,
+    L: Length<N>,
+{
     /// Gives an input of the model as a function of time, as [`Driven::input`] does; a second call for the same input
     /// replaces the first. Inputs that are not given are zero.
     ///
@@ -65,11 +68,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         self,
         name: &str,
         function: impl Fn(f64) -> f64 + Send + Sync + 'm,
-    ) -> Simulation<'m, Driven<'m, M::Declaring, L>, N, L>
-    where
-        M: Drivable<'m, N, L, Declaring: 'm>,
-        Driven<'m, M::Declaring, L>: Simulated<N, L> + Send + Sync,
-    {
+    ) -> Simulation<'m, Driven<'m, M::Declaring, L>, N, L> {
         self.driven(|driven| driven.input(name, function))
     }
 
@@ -98,11 +97,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         times: impl AsRef<[f64]>,
         values: impl AsRef<[f64]>,
         interpolation: Interpolation,
-    ) -> Simulation<'m, Driven<'m, M::Declaring, L>, N, L>
-    where
-        M: Drivable<'m, N, L, Declaring: 'm>,
-        Driven<'m, M::Declaring, L>: Simulated<N, L> + Send + Sync,
-    {
+    ) -> Simulation<'m, Driven<'m, M::Declaring, L>, N, L> {
         let (times, values) = (times.as_ref(), values.as_ref());
         self.breaks.extend(times);
         self.driven(|driven| driven.table(name, times, values, interpolation))
@@ -143,23 +138,12 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         self,
         start: L::State,
         t0: f64,
-    ) -> Result<Held<'m, M::Declaring, N, L>, RunErrorKind>
-    where
-        M: Drivable<'m, N, L, Declaring: 'm>,
-        Driven<'m, M::Declaring, L>: Simulated<N, L> + Send + Sync,
-    {
+    ) -> Result<Held<'m, M::Declaring, N, L>, RunErrorKind> {
         let cells = Arc::new(Cells::new());
         let run = self.driven(|driven| Ok(driven.holding(Arc::clone(&cells))));
         Held::new(run.steps(start, t0), cells)
     }
-}
 
-impl<'m, M, const N: usize, L> Simulation<'m, M, N, L>
-where
-    M: Drivable<'m, N, L, Declaring: 'm>,
-    Driven<'m, M::Declaring, L>: Simulated<N, L> + Send + Sync,
-    L: Length<N>,
-{
     /// The same run with changed inputs.
     fn driven(
         self,

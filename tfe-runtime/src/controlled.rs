@@ -11,11 +11,6 @@ pub const MAX_INPUTS: usize = 16;
 /// `#[dynamics]` implements it for declarations with `input(…)`. The model itself, as a [`Model`], is the one all of
 /// whose inputs are zero. Each kernel is that of [`Model`] with the inputs as an additional argument before the others,
 /// in the order of [`INPUTS`](Self::INPUTS); further entries are not read.
-#[diagnostic::on_unimplemented(
-    message = "`{Self}` declares no input",
-    label = "a model without inputs",
-    note = "inputs are declared by `input(u)` in `#[dynamics(...)]`"
-)]
 pub trait Controlled<const N: usize>: Model<N> + Send + Sync {
     /// The names of the inputs, in order.
     const INPUTS: &'static [&'static str];
