@@ -79,16 +79,22 @@ struct Cranks {
     r: f64,
 }
 
+/// Coordinates and velocities that satisfy the constraints of two cranks.
+fn cranks_in_motion(r: f64) -> ([f64; 3], [f64; 3]) {
+    let (a, rate) = (1.0_f64, 1.0);
+    let b = (0.5 * a.cos()).asin();
+    let v = [-r * a.sin() * rate, rate, -0.5 * a.sin() * rate / b.cos()];
+    ([r * a.cos(), a, b], v)
+}
+
 /// Lengths of 1e-11 m next to angles: both rows are nearly (1, 0, 0). One was silently left out as redundant, so that
 /// the second crank moved freely.
 #[test]
 fn short_cranks_are_two_conditions() {
     let ends = [1.0, 1e-11].map(|r| {
         let model = Cranks { m: 1.0, r };
-        let (a, rate) = (1.0_f64, 1.0);
-        let b = (0.5 * a.cos()).asin();
-        let v = [-r * a.sin() * rate, rate, -0.5 * a.sin() * rate / b.cos()];
-        let start = model.state([r * a.cos(), a, b], v);
+        let (q, v) = cranks_in_motion(r);
+        let start = model.state(q, v);
         let run = Simulation::new(&model).element(Mixed::<4>).step(0.01);
         let motion = run.run(start, 0.0..2.0).expect("a run");
         assert_eq!(motion.constraint_residual().rank, 2, "{r:e}");
@@ -124,10 +130,8 @@ struct CranksThrice {
 fn short_redundant_cranks_are_two_conditions() {
     let ends = [1.0, 1e-11].map(|r| {
         let model = CranksThrice { m: 1.0, r };
-        let (a, rate) = (1.0_f64, 1.0);
-        let b = (0.5 * a.cos()).asin();
-        let v = [-r * a.sin() * rate, rate, -0.5 * a.sin() * rate / b.cos()];
-        let start = model.state([r * a.cos(), a, b], v);
+        let (q, v) = cranks_in_motion(r);
+        let start = model.state(q, v);
         let run = Simulation::new(&model).element(Mixed::<4>).step(0.01);
         let motion = run.run(start, 0.0..2.0).expect("a run");
         assert_eq!(motion.constraint_residual().rank, 2, "{r:e}");

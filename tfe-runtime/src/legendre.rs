@@ -120,6 +120,16 @@ where
     }
 }
 
+/// The second argument of the energy function: v for a Lagrangian, p for a Hamiltonian.
+#[cfg(feature = "std")]
+fn argument<'a, M: Model<N>, const N: usize>(p: &'a [f64; N], v: &'a [f64; N]) -> &'a [f64; N] {
+    if const { M::FORM.is_lagrangian() } {
+        v
+    } else {
+        p
+    }
+}
+
 /// A bound of the rounding error of [`energy_at`] where it is a difference of nearly equal numbers, as 1 − cos q is
 /// near zero: the width of the enclosure of that function at (q, p). Zero where nothing is known.
 #[cfg(feature = "std")]
@@ -134,11 +144,7 @@ pub fn energy_rounding<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let z = if const { M::FORM.is_lagrangian() } {
-        v
-    } else {
-        p
-    };
+    let z = argument::<M, N>(p, v);
     let exactly = |x: f64| Enclosure::between(x, x);
     let bounds = model.energy_function(exactly(t), &q.map(exactly), &z.map(exactly));
     bounds.width()
@@ -158,11 +164,7 @@ pub fn force_rounding<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let z = if const { M::FORM.is_lagrangian() } {
-        v
-    } else {
-        p
-    };
+    let z = argument::<M, N>(p, v);
     let exactly = |x: f64| Enclosure::between(x, x);
     let mut first = First::<Enclosure, N>::zero();
     model.first(exactly(t), &q.map(exactly), &z.map(exactly), &mut first);
