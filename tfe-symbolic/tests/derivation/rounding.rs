@@ -1,8 +1,6 @@
 //! Formulas in differences keep their digits: kernels beside closed forms at states where rewritten formulas would lose them.
 
-mod kernels;
-
-use kernels::results_of;
+use crate::kernels::results_of;
 use tfe_symbolic::program::Request;
 
 const UP_TO_FIRST: Request = Request {

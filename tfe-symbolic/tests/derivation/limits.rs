@@ -1,8 +1,6 @@
 //! Derivatives that are zero times infinity, or zero over zero, and have a limit: beside closed forms.
 
-mod kernels;
-
-use kernels::{derivation_of, environment_of, results_of};
+use crate::kernels::{derivation_of, environment_of, results_of};
 use tfe_symbolic::program::interpret::interpret;
 use tfe_symbolic::program::{By, Request};
 

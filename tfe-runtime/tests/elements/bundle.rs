@@ -1,8 +1,6 @@
 //! Trajectories in lanes do what they do alone, and nothing about the others beside them.
 
-mod common;
-
-use common::{DuffingL, PendulumH, PendulumL};
+use crate::common::{DuffingL, PendulumH, PendulumL};
 use tfe_runtime::bundle::Bundle;
 use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::{

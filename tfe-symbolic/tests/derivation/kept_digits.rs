@@ -1,13 +1,11 @@
 //! No kernel loses digits against the formula as the user wrote it: random models, at states where rounding hurts, against double-double
 //! numbers. The long run is `cargo run --release --example lost_digits`.
 
-mod digits;
-
-use digits::double_double::DoubleDouble;
-use digits::entries::{Array, Entry};
-use digits::formula::{Formulas, Input, Schedule, State};
-use digits::reference::Reference;
-use digits::report::{Outcome, case_outcomes, offenders, random_outcome, table};
+use crate::digits::double_double::DoubleDouble;
+use crate::digits::entries::{Array, Entry};
+use crate::digits::formula::{Formulas, Input, Schedule, State};
+use crate::digits::reference::Reference;
+use crate::digits::report::{Outcome, case_outcomes, offenders, random_outcome, table};
 
 const SEED: u64 = 1;
 const MODELS: usize = 30;

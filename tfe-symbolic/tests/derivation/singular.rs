@@ -1,9 +1,7 @@
 //! Values and derivatives at singular points of the functions in a formula, where what it describes is not singular:
 //! beside closed forms.
 
-mod kernels;
-
-use kernels::results_of;
+use crate::kernels::results_of;
 use tfe_symbolic::program::Request;
 
 const ALL: Request = Request {

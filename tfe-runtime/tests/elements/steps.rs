@@ -1,11 +1,9 @@
 //! Steps on nonlinear models: orders, equivalences, structure, solvers, failures.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod failures;
 mod solvers;
 
-use common::*;
+use crate::common::*;
 use tfe_runtime::step::{Control, Impulse, Stepper};
 use tfe_runtime::{Element, Model, Solve, State, legendre, transition};
 

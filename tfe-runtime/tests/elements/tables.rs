@@ -1,8 +1,6 @@
 //! The reference tables: the damped oscillator, and one step of the pendulum.
 
-mod common;
-
-use common::{
+use crate::common::{
     OscillatorH, OscillatorL, PendulumH, PendulumL, assert_close, numbers, reference, vector,
 };
 use tfe_runtime::{Element, Model, Rule, State, transition};

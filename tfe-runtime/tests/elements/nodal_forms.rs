@@ -1,8 +1,6 @@
 //! The nodal forms of the paper against the steps.
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use nalgebra::DMatrix;
 use tfe_runtime::quadrature::Quadrature;
 use tfe_runtime::weak_form::{

@@ -1,8 +1,6 @@
 //! One model declared both ways: the views of each are the other.
 
-mod common;
-
-use common::{DoublePendulum, DuffingH, DuffingL, Relativistic, assert_close};
+use crate::common::{DoublePendulum, DuffingH, DuffingL, Relativistic, assert_close};
 use tfe_runtime::legendre::{
     energy, energy_at, hamiltonian_view, lagrangian_view, momentum, state, velocity,
 };
