@@ -203,7 +203,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         self
     }
 
-    /// Sets the phase condition, for autonomous models: which of the orbits that differ in their phase only.
+    /// Sets the phase condition, for autonomous models: it selects one of the orbits that differ only in their phase.
     #[must_use]
     pub fn phase(mut self, phase: Phase) -> Self {
         self.orbit = self.orbit.phase(phase);

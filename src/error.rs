@@ -21,7 +21,7 @@ pub enum RunErrorKind {
     /// The element does not exist: an impossible number of nodes, or a quadrature that this family of elements does
     /// not have.
     Element(ElementError),
-    /// The model does not pass its [check](crate::Model::check): an index that its fields make is outside its array, or
+    /// The model does not pass its [check](crate::Model::check): an index computed from its fields is outside its array, or
     /// lengths do not fit each other. For models of run-time length also something that such models do not support.
     Family(family::ModelError),
     /// The step size is zero, infinite or not a number. It is not a number (NaN) if a run without an end was given no
@@ -88,7 +88,7 @@ pub enum RunErrorKind {
     },
     /// The time of a node is not finite, or does not lie beyond that of the node before, in the direction of the run.
     NodeOrder {
-        /// Which node, the first one 0.
+        /// The index of the node, from 0.
         node: usize,
         /// Its time.
         time: f64,
@@ -116,7 +116,7 @@ pub enum RunErrorKind {
     /// The start violates the constraints. [`ConsistentState`](crate::ConsistentState) finds consistent initial
     /// conditions.
     Inconsistent {
-        /// Its time.
+        /// The time of the start.
         time: f64,
         /// The violation of each constraint.
         residuals: Vec<Residual>,
@@ -189,7 +189,7 @@ pub enum RunErrorKind {
     Input(InputError),
     /// An earlier step failed, so that the run cannot continue.
     Ended {
-        /// The last node.
+        /// The time of the last node.
         time: f64,
     },
     /// The call cannot be used with steps that are cut at [kinks](crate::Simulation::at_kinks).

@@ -10,10 +10,10 @@ use tfe_runtime::{
 
 /// Evaluates a model at points of phase space: every [`Model`] and every [`family::Model`], and nothing else.
 pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
-    /// Whether it may be evaluated at all: lengths and indices fit each other.
+    /// Checks that the model can be evaluated: its lengths and indices fit each other.
     ///
     /// # Errors
-    /// The first that does not.
+    /// [`ModelError`] for the first that does not fit.
     fn checked(&self) -> Result<(), ModelError>;
 
     /// The names of the coordinates.

@@ -97,8 +97,8 @@ impl<const N: usize, L: Length<N>> Linearised<N, L> {
         (self.motion, self.transitions)
     }
 
-    /// The derivative of the end of the motion with respect to its start: the product of all transition matrices, the
-    /// first one on the right; the identity for an empty span.
+    /// The derivative of the end of the motion with respect to its start, 2N × 2N, ordered (p, q): the product of all
+    /// transition matrices, the first one on the right; the identity for an empty span.
     ///
     /// Over one period of a periodic motion it is the monodromy matrix.
     ///

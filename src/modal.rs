@@ -158,8 +158,8 @@ impl<M, S, const R: usize> Modal<'_, M, R, S> {
             .map(|square| square.abs().sqrt().copysign(square))
     }
 
-    /// The shape φ_k of a mode, normalised to φ_k·M φ_k = 1 and with its largest entry positive; `None` if there is no
-    /// such mode.
+    /// The shape φ_k of a mode, one entry for each coordinate of the full model, normalised to φ_k·M φ_k = 1 and with
+    /// its largest entry positive; `None` if there is no such mode.
     pub fn shape(&self, k: usize) -> Option<&[f64]> {
         self.shapes.get(k).map(Vec::as_slice)
     }

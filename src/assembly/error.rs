@@ -9,7 +9,7 @@ use tfe_runtime::{ElementError, LegendreError, ModelError, StepError};
 pub enum AssemblyError {
     /// The model does not pass its [check](crate::Model::check).
     Model(ModelError),
-    /// The time element does not exist.
+    /// The element does not exist: an impossible number of nodes, or a quadrature that its family does not have.
     Element(ElementError),
     /// The equations of an element could not be linearised.
     Linearise {
@@ -26,13 +26,14 @@ pub enum AssemblyError {
     /// this happens if constraints contradict each other, if the position is singular, or if the coordinates asked for
     /// at the ends violate the constraints.
     Violated {
-        /// The constraint.
+        /// The name of the constraint.
         constraint: &'static str,
         /// The time of the node.
         time: f64,
-        /// Whether positions violate it, or velocities.
+        /// Whether the positions violate it; otherwise the velocities do.
         position: bool,
-        /// By how much: |φ| or |A v + a| over the length of its row, relative to the largest position or velocity of the solution.
+        /// The relative violation, the first of these that exceeds the limit: |φ| / |φ_q| relative to the largest |q| of
+        /// the solution, |A v + a| / |A| relative to the largest |v|, and |φ| and |A v + a| relative to their own terms.
         residual: f64,
     },
     /// The assembled equations are singular: there is no solution, or there are many close to each other (for example
@@ -45,9 +46,9 @@ pub enum AssemblyError {
     Stalled {
         /// Iterations done.
         iterations: u32,
-        /// The size of the last correction beside the solution.
+        /// The size of the last correction, relative to the solution.
         correction: f64,
-        /// The value asked for.
+        /// The tolerance: the relative correction at which the iteration ends.
         tolerance: f64,
     },
 }

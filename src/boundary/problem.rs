@@ -462,16 +462,16 @@ impl<M: Model<N>, const N: usize> BoundaryMotion<'_, M, N> {
 pub enum BoundaryError {
     /// The span was not given, is empty, or is not finite.
     Span {
-        /// Its start.
+        /// The start of the span.
         start: f64,
-        /// Its end.
+        /// The end of the span.
         end: f64,
     },
     /// The number of conditions is not 2N.
     Count {
-        /// So many are needed.
+        /// The number of conditions needed, 2N.
         needed: usize,
-        /// So many were given.
+        /// The number of conditions given.
         given: usize,
     },
     /// A component does not exist: its index is not below N.
@@ -486,9 +486,9 @@ pub enum BoundaryError {
     },
     /// A given value is not finite.
     Value {
-        /// Of which component.
+        /// The component for which it was given.
         component: Component,
-        /// Its value.
+        /// The value given.
         value: f64,
     },
     /// The mesh is invalid.

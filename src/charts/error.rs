@@ -21,7 +21,7 @@ pub enum ChartError {
     UnknownEnding {
         /// The path of the file.
         path: PathBuf,
-        /// The endings that can be.
+        /// The supported endings.
         known: &'static [&'static str],
     },
     /// There is nothing to draw: no point, or no cell, has finite numbers.

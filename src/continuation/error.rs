@@ -21,20 +21,20 @@ pub enum ContinuationErrorKind {
     NoRange,
     /// The range is not finite, or the value that the model has does not lie in it, before its end.
     Range {
-        /// Its start.
+        /// The start of the range.
         start: f64,
-        /// Its end.
+        /// The end of the range.
         end: f64,
-        /// The value of the model.
+        /// The value of the parameter in the model as given.
         value: f64,
     },
     /// The step sizes are not positive and finite, or the first is not between the smallest and the largest.
     Steps {
         /// The first step.
         step: f64,
-        /// The smallest one.
+        /// The smallest step.
         smallest: f64,
-        /// The largest one.
+        /// The largest step.
         largest: f64,
     },
     /// The first orbit was not found.
@@ -45,7 +45,7 @@ pub enum ContinuationErrorKind {
         parameter: f64,
         /// The step that failed.
         step: f64,
-        /// Why; `None` if the branch turned too much.
+        /// The error of the corrector; `None` if it found an orbit, but the branch turned too much.
         source: Option<OrbitError>,
     },
 }

@@ -29,7 +29,7 @@ pub enum InputError {
         /// The start of the element (or of the run) in which it was called.
         time: f64,
     },
-    /// Sampled feedback whose period, name or time of sampling is invalid.
+    /// The period, the input or a sampling time of a sampled feedback is invalid.
     Sampling {
         /// The input.
         name: String,

@@ -99,8 +99,10 @@ impl<const N: usize, L: Length<N>> Ends<N, L> {
 impl<const N: usize, L: Length<N>> Index<usize> for Ends<N, L> {
     type Output = Result<Node<N, L>, RunErrorKind>;
 
+    /// The result of run `index`.
+    ///
     /// # Panics
-    /// Beyond the last run; [`Ends::get`] does not.
+    /// If there is no such run; [`Ends::get`] returns `None` then.
     fn index(&self, index: usize) -> &Self::Output {
         &self.results[index]
     }

@@ -52,7 +52,7 @@ pub enum FidelityError {
     Parts {
         /// The number of parts asked for.
         parts: usize,
-        /// The most steps of a run.
+        /// The largest number of steps of a run.
         most: usize,
     },
     /// The span is empty, or its ends are not finite.

@@ -29,15 +29,15 @@ pub enum FitError {
         /// The names that exist.
         known: Vec<String>,
     },
-    /// Measured values that cannot be used.
+    /// Some measured values cannot be used.
     Measured {
         /// The output.
         name: String,
         /// The reason.
         why: &'static str,
     },
-    /// A range that does not contain the first value of its parameter, or that belongs to a parameter that is not
-    /// fitted.
+    /// A range does not contain the value at which the fit of its parameter starts, or belongs to a parameter that is
+    /// not fitted.
     Bounds {
         /// The parameter.
         name: String,
@@ -45,7 +45,7 @@ pub enum FitError {
         low: f64,
         /// The upper end.
         high: f64,
-        /// The first value; NaN where it is not looked for.
+        /// The value of the parameter at which the fit starts; NaN if the parameter is not fitted.
         value: f64,
     },
     /// A value was measured before the start.
@@ -59,9 +59,9 @@ pub enum FitError {
     StartOfConstraints,
     /// There are fewer measured values than unknowns.
     TooFew {
-        /// Measured values.
+        /// The number of measured values.
         values: usize,
-        /// Parameters and numbers of the start that are looked for.
+        /// The number of unknowns: the fitted parameters and, if the start is fitted, its 2N components.
         unknowns: usize,
     },
     /// The run with the first parameters failed. (If a later run fails, the step of the fit is shortened.)
@@ -70,13 +70,13 @@ pub enum FitError {
     NotFinite,
     /// The iteration did not converge.
     NotConverged {
-        /// The unknowns where the error was least, in the order of parameters and start.
+        /// The values of the unknowns with the smallest error found, first the parameters, then the start.
         best: Vec<f64>,
-        /// The root of the mean square of (y − m)/σ there.
+        /// The root mean square of (y − m)/σ with these values.
         deviation: f64,
-        /// Runs.
+        /// The number of runs made.
         runs: usize,
-        /// The message of the iteration.
+        /// Why the iteration ended.
         why: String,
     },
     /// The measured values do not determine all unknowns: some change of the unknowns changes no output.

@@ -20,9 +20,10 @@ pub enum ModalError {
     /// (gyroscopic forces). A symmetric part is the total time derivative ½ d(q·S q)/dt: in a Lagrangian it has no
     /// effect and can be left out.
     VelocityCoupling {
-        /// The velocity. Of the entries those are told first that have no equal counterpart.
+        /// The index of the velocity. If ∂²L/∂v∂q is not symmetric, velocity and coordinate are those of an entry that
+        /// differs from its transposed one.
         velocity: usize,
-        /// The coordinate.
+        /// The index of the coordinate.
         coordinate: usize,
     },
     /// The mass matrix is not positive definite.

@@ -20,15 +20,16 @@ pub enum Warning {
     /// several findings in a row make one warning. Not checked for elements that are stable at every step size
     /// ([`Element::is_a_stable`]), for models with constraints, and for models of run-time length.
     UnstableStep {
-        /// Where the first such element begins.
+        /// The time at the start of the first such element.
         time: f64,
-        /// The length of the element that grows most; negative in a run backwards.
+        /// The length of the element whose mode grows most; negative in a run backwards.
         step: f64,
         /// The element.
         element: Element,
-        /// The factor by which that element amplifies the mode: its spectral radius, unless the model has other modes that grow.
+        /// The factor by which a step with that element multiplies the amplitude of the mode: the modulus of an
+        /// eigenvalue of its transition matrix, the largest one unless the model itself has modes that grow.
         radius: f64,
-        /// The factor |e^{λh}| by which the linear model amplifies it.
+        /// The factor |e^{λh}| by which the linear model multiplies it in the same time, with λ its eigenvalue.
         exact: f64,
     },
     /// The mass matrix ∂²L/∂v² at the start has eigenvalues of both signs, so that some forces accelerate against
@@ -38,17 +39,18 @@ pub enum Warning {
     /// own mass is one. For models of run-time length with more than 64 coordinates that are coupled by their masses,
     /// only single coordinates and coupled pairs are checked.
     MassIndefinite {
-        /// The start.
+        /// The time at the start of the run.
         time: f64,
-        /// The least eigenvalue; where it is small beside roundings of the largest one, or of parts of the matrix, a number v·Mv/v·v below zero.
+        /// The smallest eigenvalue of the mass matrix M, negative. If rounding hides it, or only coordinates and pairs
+        /// were checked, a value below zero that v·M v / v·v takes for some velocities v.
         least: f64,
-        /// The largest one, or such a number above zero.
+        /// The largest eigenvalue, positive; in the same cases a value above zero that v·M v / v·v takes.
         largest: f64,
     },
     /// The energy at a node is not finite: no velocity belongs to the momentum there (the mass matrix is singular), or
     /// the model has a singular point.
     EnergyNotFinite {
-        /// The first such node.
+        /// The time of the first such node.
         time: f64,
     },
     /// The model conserves the energy, but between two nodes it changes by more than a tenth of the largest kinetic
@@ -57,13 +59,13 @@ pub enum Warning {
     /// Checked at every recorded node, except across impulses, and unless the model is linear, forced, damped, depends
     /// on time or has constraints.
     EnergyJump {
-        /// The node after the largest jump.
+        /// The time of the node after the largest jump.
         time: f64,
-        /// The energy before it.
+        /// The energy at the node before that jump.
         before: f64,
-        /// The energy after it.
+        /// The energy at the node after it.
         after: f64,
-        /// How many such jumps there are.
+        /// The number of such jumps.
         count: usize,
     },
     /// Forces of the model have kinks or jumps, and steps do not [end](crate::Simulation::at_kinks) there. Elements
@@ -78,13 +80,14 @@ pub enum Warning {
     /// Checked in elements whose iteration did not contract quickly, the 0th, 1st, 2nd, 4th, 8th, … of these; not in
     /// linear models, nor with [`Solve::Trusting`](crate::Solve::Trusting).
     Unresolved {
-        /// Where the first such element begins.
+        /// The time at the start of the first such element.
         time: f64,
         /// The length of that element; negative in a run backwards.
         step: f64,
-        /// The largest distance of both ends, as a part of what the motion extends over.
+        /// The largest difference between the two results, relative to the extent of the motion (largest minus smallest
+        /// value of coordinates and of momenta).
         distance: f64,
-        /// How many such elements were found.
+        /// The number of such elements that were found.
         count: usize,
     },
 }

@@ -79,7 +79,7 @@ pub enum OptimalControlErrorKind {
     Degree {
         /// The degree asked for.
         degree: usize,
-        /// The largest there is.
+        /// The largest possible degree.
         largest: usize,
     },
     /// A momentum of the guess could not be found (Legendre transform).
@@ -104,9 +104,9 @@ pub enum OptimalControlErrorKind {
     Stalled {
         /// Iterations done.
         iterations: usize,
-        /// The size of the last correction beside the solution.
+        /// The size of the last correction, relative to the solution.
         correction: f64,
-        /// The value asked for.
+        /// The tolerance: the relative correction at which the iteration ends.
         tolerance: f64,
     },
     /// The search reached a stationary point that is not a minimum: small changes of the inputs, and of the free part

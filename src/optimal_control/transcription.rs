@@ -2,7 +2,7 @@
 //!
 //! The interior variables of an element are the rates ν_j of the coordinates (and, for a Hamiltonian, the momenta p_l
 //! at the points). The outer ones are the state (p, q) of its first node and the coefficients of its inputs, which are
-//! polynomials in time. With the tables of the element (theory.md, section 4)
+//! polynomials in time. With the tables of the element (theory.md, section 6.4)
 //!
 //! ```text
 //! q_l = q₀ + h Σ_j C_lj ν_j ,     v_l = Σ_j E_lj ν_j ,     u_l = Σ_k P_k(c_l) û_k ,

@@ -14,14 +14,14 @@ pub enum OrbitError {
     NoPeriod,
     /// The period, as given or as found, is not positive.
     Period {
-        /// Its value.
+        /// The period given or found.
         period: f64,
     },
     /// A number that was given is infinite or not a number.
     Number {
-        /// What it is.
+        /// The setting to which it was given, such as `period`.
         what: &'static str,
-        /// Its value.
+        /// The number given.
         value: f64,
     },
     /// The model depends on time: the period of its orbits is that of the forcing (or a multiple), not an unknown.
@@ -39,22 +39,22 @@ pub enum OrbitError {
     Run(RunErrorKind),
     /// An event stopped a motion before the end of its period.
     Stopped {
-        /// The time.
+        /// The time of the event.
         time: f64,
     },
     /// At the end of the period, events have left a parameter with another value than at the start: the state repeats,
     /// the model does not.
     ParameterLeft {
-        /// The parameter.
+        /// The name of the parameter.
         parameter: String,
-        /// Its value at the end.
+        /// Its value at the end of the period.
         value: f64,
     },
     /// For orbits with events: Newton's corrections no longer bring the end of the motion nearer to its start.
     Stalled {
         /// The distance between start and end, relative to the size of the motion.
         residual: f64,
-        /// Corrections so far.
+        /// The number of corrections made.
         iterations: u32,
     },
     /// The call is not supported for this kind of model, or has no meaning for orbits of this kind.

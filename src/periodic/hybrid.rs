@@ -168,9 +168,9 @@ where
     /// Finds the orbit and its Floquet multipliers.
     ///
     /// # Errors
-    /// [`OrbitError`]: [`Run`](OrbitError::Run) if a motion fails, [`Stalled`](OrbitError::Stalled) if no orbit is
-    /// found from the guess, [`AtRest`](OrbitError::AtRest) if the search for an unknown period ends at an
-    /// equilibrium.
+    /// [`OrbitError`] if a setting is invalid; [`Run`](OrbitError::Run) if a motion fails,
+    /// [`Stalled`](OrbitError::Stalled) if no orbit is found from the guess, [`AtRest`](OrbitError::AtRest) if the
+    /// search for an unknown period ends at an equilibrium.
     pub fn solve(&self) -> Result<HybridOrbit<N, L>, OrbitError> {
         /// Corrections below this that no longer decrease are rounding errors.
         const ROUNDED: f64 = 1e-9;

@@ -171,7 +171,7 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         self
     }
 
-    /// Sets the phase condition, for autonomous models: which of the orbits that differ only in their phase.
+    /// Sets the phase condition, for autonomous models: it selects one of the orbits that differ only in their phase.
     #[must_use]
     pub fn phase(mut self, phase: Phase) -> Self {
         self.phase = phase;

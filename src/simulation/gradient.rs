@@ -67,7 +67,8 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::NoOutput`] or [`RunErrorKind::Loss`] if the loss does
-    /// not fit the model or the span, [`RunErrorKind::Transition`] if an element has no derivative, and
+    /// not fit the model or the span, [`RunErrorKind::Transition`] if an element or an event has no derivative,
+    /// [`RunErrorKind::SetUnsupported`] if an event [sets](crate::Act::Set) a parameter, and
     /// [`RunErrorKind::KinksUnsupported`] after [`at_kinks(true)`](Self::at_kinks), because the times of the cuts
     /// depend on the parameters.
     pub fn gradient(

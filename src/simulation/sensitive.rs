@@ -41,8 +41,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Transition`] if an element or an event has no
-    /// derivative, [`RunErrorKind::KinksUnsupported`] after [`at_kinks(true)`](Self::at_kinks), because the times of
-    /// the cuts depend on the state and the parameters.
+    /// derivative, [`RunErrorKind::SetUnsupported`] if an event [sets](crate::Act::Set) a parameter,
+    /// [`RunErrorKind::KinksUnsupported`] after [`at_kinks(true)`](Self::at_kinks), because the times of the cuts depend
+    /// on the state and the parameters.
     pub fn run_sensitive(
         &self,
         start: State<N>,

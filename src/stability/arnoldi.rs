@@ -41,7 +41,7 @@ pub enum DominantError {
     NotConverged {
         /// The best value so far.
         best: Dominant,
-        /// The value asked for.
+        /// The tolerance, relative to the modulus of the eigenvalue.
         tolerance: f64,
     },
 }

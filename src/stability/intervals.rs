@@ -100,8 +100,10 @@ pub fn unstable_intervals_of<E>(
 /// order.
 ///
 /// Examples are the limit speed of a spinning top, or the step size at which an element loses its stability. The
-/// method, conditions, tolerances and errors are those of [`unstable_intervals_of`]; the ends of the range are not
-/// included.
+/// method, conditions and tolerances are those of [`unstable_intervals_of`]; the ends of the range are not included.
+///
+/// # Errors
+/// As from [`unstable_intervals_of`].
 ///
 /// ```
 /// use nalgebra::DMatrix;

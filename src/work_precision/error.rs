@@ -15,7 +15,7 @@ use tfe_runtime::ElementError;
 pub enum WorkPrecisionError {
     /// No element was given.
     NoElements,
-    /// No step was given.
+    /// No step size was given.
     NoSteps,
     /// An element does not exist: an impossible number of nodes, or a quadrature that its family does not have.
     Element(ElementError),
@@ -44,16 +44,16 @@ pub enum WorkPrecisionError {
     ReferenceRun(RunErrorKind),
     /// The reference that was given is not finite.
     ReferenceValue {
-        /// At which time.
+        /// The time of that state.
         time: f64,
     },
     /// The length of a vector of the reference that was given differs from that of the model.
     ReferenceLength {
         /// `q` or `p`.
         vector: &'static str,
-        /// At which time.
+        /// The time of that state.
         time: f64,
-        /// Its length.
+        /// The length of that vector.
         length: usize,
         /// The number of coordinates.
         expected: usize,
@@ -126,7 +126,7 @@ pub enum SaveError {
     UnknownEnding {
         /// The path of the file.
         path: PathBuf,
-        /// The endings that can be.
+        /// The supported endings.
         known: &'static [&'static str],
     },
     /// Pictures and pages need the feature `charts`.

@@ -16,17 +16,19 @@ use tfe_runtime::{Element, Mixed, Solve};
 pub enum Reference {
     /// It was given by the caller.
     Given {
-        /// Its relative error, as it was given; else one rounding.
+        /// Its relative error, as given by the caller, but at least the rounding unit 2⁻⁵².
         uncertainty: f64,
     },
     /// It is a run with short steps, checked against one with steps twice as long.
     Computed {
         /// The element.
         element: Element,
-        /// The longest step of the finer run: others are shorter, to meet the nodes of all runs.
+        /// The longest step of the finer run, in units of time. Other steps are shorter, because the run has nodes at all
+        /// times at which runs are compared.
         step: f64,
-        /// The largest difference of both runs at the end, relative to the scale of errors: what two different sums of roundings, or two
-        /// different steps, disagree on.
+        /// The estimated relative error: the difference of both runs at the end of the span, the larger one of
+        /// coordinates (divided by the largest |q|) and momenta (divided by the largest |p|), but at least the rounding
+        /// unit or the value given by the caller.
         uncertainty: f64,
     },
 }

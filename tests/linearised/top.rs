@@ -1,4 +1,4 @@
-//! The linearised upright spinning top: section 13 of the theory, all rows of the table.
+//! The linearised upright spinning top: section 13 of the theory, (T-87) to (T-89).
 
 use crate::common::{count, list, matrix, number, reference, word};
 use nalgebra::DMatrix;

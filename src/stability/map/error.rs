@@ -15,9 +15,9 @@ use tfe_runtime::{ElementError, StepError};
 pub enum MapError {
     /// The map has no cells, or too many.
     Resolution {
-        /// Cells in the direction of x asked for.
+        /// The number of cells in the direction of x asked for.
         columns: usize,
-        /// Cells in the direction of y asked for.
+        /// The number of cells in the direction of y asked for.
         rows: usize,
     },
     /// The ends of a range are not finite or not ascending.
@@ -35,7 +35,7 @@ pub enum MapError {
     Period {
         /// The period asked for.
         period: f64,
-        /// The elements asked for.
+        /// The number of elements asked for.
         elements: usize,
     },
     /// The file could not be written.
@@ -49,7 +49,7 @@ pub enum MapError {
     UnknownEnding {
         /// The path of the file.
         path: PathBuf,
-        /// The endings that can be.
+        /// The supported endings.
         known: &'static [&'static str],
     },
     /// The picture could not be made.
@@ -133,7 +133,7 @@ pub struct PointFailure<E> {
 pub enum PointError<E> {
     /// The value is infinite or not a number.
     NotFinite {
-        /// What it is.
+        /// The value: infinite or NaN.
         value: f64,
     },
     /// The value could not be computed.
@@ -193,7 +193,7 @@ pub enum FloquetError {
     NotAtRest {
         /// The number of the element in the period, from 0.
         element: usize,
-        /// The largest coordinate or momentum after it.
+        /// The largest magnitude of a coordinate or momentum after that element, in the units of the model.
         distance: f64,
     },
     /// The eigenvalues of the monodromy matrix could not be computed.
