@@ -2,8 +2,8 @@
 
 use crate::differences::difference;
 use crate::largest::larger;
+use crate::lengths::{of_both_lengths, of_heap};
 use nalgebra::Complex;
-use tfe::family::FamilyState;
 use tfe::length::RunTimeLength;
 use tfe::periodic_schur::Multiplier;
 use tfe::prelude::*;
@@ -62,30 +62,7 @@ pub(super) struct ThreeRods {
 pub(super) fn rods() -> (Rods, ThreeRods) {
     let (m, l) = ([1.0, 0.5, 2.0], [0.8, 0.6]);
     let (g, k, c, a, w, s, b) = (9.81, 0.7, 0.1, 0.2, 3.0, 0.3, 0.25);
-    let long = Rods {
-        n: 3,
-        m: m.to_vec(),
-        l: l.to_vec(),
-        g,
-        k,
-        c,
-        a,
-        w,
-        s,
-        b,
-    };
-    let fixed = ThreeRods {
-        m,
-        l,
-        g,
-        k,
-        c,
-        a,
-        w,
-        s,
-        b,
-    };
-    (long, fixed)
+    of_both_lengths!(Rods(3), ThreeRods: m, l, g, k, c, a, w, s, b)
 }
 
 /// An initial state on the constraints at time 0, where the support moves at a ω.
@@ -110,13 +87,6 @@ pub(super) fn start(fixed: &ThreeRods) -> State<6> {
         [x[0], x[1], x[2], y[0], y[1], y[2]],
         [vx[0], vx[1], vx[2], vy[0], vy[1], vy[2]],
     )
-}
-
-pub(super) fn of_heap<const N: usize>(state: &State<N>) -> FamilyState {
-    FamilyState {
-        q: state.q.to_vec(),
-        p: state.p.to_vec(),
-    }
 }
 
 /// The largest difference and the largest number.
@@ -331,15 +301,7 @@ struct Top {
 #[test]
 fn unit_quaternions_have_the_velocities_and_derivatives_of_fixed_size() {
     let (i1, i2, i3, mgd, r) = (1.0, 1.3, 0.5, 1.0, 1.0);
-    let (n, fixed) = (1, Top { i1, i2, i3, mgd, r });
-    let long = Tops {
-        n,
-        i1,
-        i2,
-        i3,
-        mgd,
-        r,
-    };
+    let (long, fixed) = of_both_lengths!(Tops(1), Top: i1, i2, i3, mgd, r);
     // e = (0.8, 0, 0.6, 0), with the body rates 0.3, −0.5 and 4.
     let start = fixed.state([0.8, 0.0, 0.6, 0.0], [0.15, 1.32, -0.2, 1.51]);
     for element in ELEMENTS {
@@ -453,29 +415,8 @@ struct DrivenTwo {
 }
 
 fn driven(f: f64, a: f64, c: f64) -> (DrivenRods, DrivenTwo) {
-    let (n, m, s, g, l, omega) = (2, 0.8, 0.1, 1.0, 1.1, 2.3);
-    let long = DrivenRods {
-        n,
-        m,
-        s,
-        g,
-        l,
-        a,
-        c,
-        f,
-        omega,
-    };
-    let fixed = DrivenTwo {
-        m,
-        s,
-        g,
-        l,
-        a,
-        c,
-        f,
-        omega,
-    };
-    (long, fixed)
+    let (m, s, g, l, omega) = (0.8, 0.1, 1.0, 1.1, 2.3);
+    of_both_lengths!(DrivenRods(2), DrivenTwo: m, s, g, l, a, c, f, omega)
 }
 
 /// Two angles that swing with an amplitude and a phase, as coordinates and velocities.
@@ -562,8 +503,8 @@ struct FreeTwo {
 
 #[test]
 fn conservative_orbits_are_those_of_fixed_size() {
-    let (n, m, s, g, l) = (2, 0.8, 0.1, 1.0, 1.1);
-    let (long, fixed) = (FreeRods { n, m, s, g, l }, FreeTwo { m, s, g, l });
+    let (m, s, g, l) = (0.8, 0.1, 1.0, 1.1);
+    let (long, fixed) = of_both_lengths!(FreeRods(2), FreeTwo: m, s, g, l);
     let guess = move |t: f64| swing(t, 0.73, 0.3, l);
     let ours = PeriodicOrbit::of(&long).element(Mixed::<5>).elements(40);
     let ours = ours.unknown_period(std::f64::consts::TAU / 0.73);

@@ -1,14 +1,15 @@
 //! Derivatives across events that change the state or end the run: compared with those of the same model of fixed size,
 //! and with differences of runs.
 
-use crate::constrained::of_heap;
 use crate::differences::difference_over;
 use crate::largest::larger;
+use crate::lengths::{SAME, apart, bounce, check_matrices, of_both_lengths, of_heap};
 use tfe::error::RunErrorKind;
-use tfe::family;
-use tfe::length::RunTimeLength;
+use tfe::family::FamilyState;
+use tfe::length::{Length, RunTimeLength};
 use tfe::prelude::*;
 use tfe::sensitivity::Sensitive;
+use tfe::{Occurrence, family};
 
 /// Balls coupled by springs above a ground that moves up and down, in a wind that changes with time.
 #[dynamics(
@@ -70,29 +71,30 @@ pub(super) struct TwoByMomenta {
     limit: f64,
 }
 
-const MASSES: [f64; 3] = [1.0, 0.5, 0.8];
 pub(super) const Y: [f64; 3] = [0.6, 1.5, 2.7];
 pub(super) const V: [f64; 3] = [0.1, -0.2, 0.3];
 pub(super) const G: f64 = 9.81;
 
-pub(super) fn balls(g: f64) -> Balls {
-    Balls {
-        n: 3,
-        m: MASSES.to_vec(),
-        g,
-        k: 40.0,
-        c: 0.2,
-        a: 0.1,
-    }
-}
-
 pub(super) const THREE: ThreeBalls = ThreeBalls {
-    m: MASSES,
+    m: [1.0, 0.5, 0.8],
     g: G,
     k: 40.0,
     c: 0.2,
     a: 0.1,
 };
+
+pub(super) fn balls(g: f64) -> Balls {
+    let ThreeBalls { m, k, c, a, .. } = THREE;
+    let m = m.to_vec();
+    Balls {
+        n: 3,
+        m,
+        g,
+        k,
+        c,
+        a,
+    }
+}
 
 pub(super) fn long(balls: &Balls) -> family::Simulation<'_, Balls> {
     Simulation::new(balls).element(Mixed::<6>).step(0.05)
@@ -103,37 +105,120 @@ pub(super) fn fixed() -> Simulation<'static, ThreeBalls, 3> {
 }
 
 /// The same model by momenta with both kinds of length, and a start.
-pub(super) fn by_momenta(limit: f64) -> (ByMomenta, TwoByMomenta, tfe::runtime::State<2>) {
+pub(super) fn by_momenta(limit: f64) -> (ByMomenta, TwoByMomenta, State<2>) {
     let (m, k) = (1.5, 2.0);
     let (q, p) = ([-0.9, 0.4], [0.0, 0.1]);
+    let (long, two) = of_both_lengths!(ByMomenta(2), TwoByMomenta: m, k, limit);
+    (long, two, State { q, p })
+}
+
+/// The same run of balls with both kinds of length.
+type RunsOfBalls<'m> = (
+    family::Simulation<'m, Balls>,
+    Simulation<'static, ThreeBalls, 3>,
+);
+
+/// Balls of which the first bounces off the ground.
+pub(super) fn bouncing(balls: &Balls) -> RunsOfBalls<'_> {
     (
-        ByMomenta { n: 2, m, k, limit },
-        TwoByMomenta { m, k, limit },
-        tfe::runtime::State { q, p },
+        long(balls).on("ground", Crossing::Falling, bounce),
+        fixed().on("ground", Crossing::Falling, bounce),
     )
 }
 
-/// The largest difference of two lists of numbers, relative to the largest of these numbers, but at least to 1.
-pub(super) fn apart<'a>(
-    a: impl IntoIterator<Item = &'a f64>,
-    b: impl IntoIterator<Item = &'a f64>,
-) -> f64 {
-    let (a, b): (Vec<f64>, Vec<f64>) = (
-        a.into_iter().copied().collect(),
-        b.into_iter().copied().collect(),
-    );
-    assert_eq!(a.len(), b.len());
-    let size = a
-        .iter()
-        .chain(&b)
-        .fold(1.0, |size, one| larger(size, one.abs()));
-    let pairs = a.iter().zip(&b);
-    pairs.fold(0.0, |most, (a, b)| larger(most, (a - b).abs() / size))
+/// Impulses at the ground, and an end where the last ball is high after half a unit of time.
+pub(super) fn ending(balls: &Balls) -> RunsOfBalls<'_> {
+    fn blow<const N: usize, L: Length<N>>(event: &Occurrence<'_, N, L>) -> Act<N, L>
+    where
+        L::Vector: From<[f64; 3]>,
+    {
+        let (p, v) = (event.p.as_ref(), event.v.as_ref());
+        Act::Impulse([-1.8 * p[0], 0.1 * v[1], 0.0].into())
+    }
+    fn high<V: AsRef<[f64]>>(_: f64, y: &V, v: &V) -> f64 {
+        v.as_ref()[2] + 0.1 * y.as_ref()[0]
+    }
+    fn end<const N: usize, L: Length<N>>(event: &Occurrence<'_, N, L>) -> Act<N, L> {
+        match event.t > 0.5 {
+            true => Act::Stop,
+            false => Act::Record,
+        }
+    }
+    (
+        long(balls)
+            .on("ground", Crossing::Falling, blow)
+            .on_function("high", Crossing::Falling, high, end),
+        fixed().on("ground", Crossing::Falling, blow).on_function(
+            "high",
+            Crossing::Falling,
+            high,
+            end,
+        ),
+    )
 }
 
-/// Both are derivatives of the same computed motion. Actions are differentiated by differences over 2e-3, with a
-/// rounding error of some 1e-13 / 2e-3, which each bounce multiplies several times.
-pub(super) const SAME: f64 = 1e-9;
+/// The same run by momenta with both kinds of length.
+type RunsByMomenta<'m> = (
+    family::Simulation<'m, ByMomenta>,
+    Simulation<'m, TwoByMomenta, 2>,
+);
+
+/// A momentum that has grown to the limit is reversed.
+pub(super) fn turning<'m>(long: &'m ByMomenta, two: &'m TwoByMomenta) -> RunsByMomenta<'m> {
+    fn turn<const N: usize, L: Length<N>>(event: &Occurrence<'_, N, L>) -> Act<N, L>
+    where
+        L::Vector: From<[f64; 2]>,
+    {
+        let (q, p) = (event.q.as_ref(), event.p.as_ref());
+        let turned = [-p[0], p[1] * q[0]];
+        Act::Restart(L::state(event.q.clone(), turned.into()))
+    }
+    let run = Simulation::new(long).element(Mixed::<6>).step(0.1);
+    let beside = Simulation::new(two).element(Mixed::<6>).step(0.1);
+    (
+        run.on("fast", Crossing::Rising, turn),
+        beside.on("fast", Crossing::Rising, turn),
+    )
+}
+
+/// An impulse that causes an event.
+pub(super) fn kicked<'m>(long: &'m ByMomenta, two: &'m TwoByMomenta) -> RunsByMomenta<'m> {
+    fn back<const N: usize, L: Length<N>>(event: &Occurrence<'_, N, L>) -> Act<N, L>
+    where
+        L::Vector: From<[f64; 2]>,
+    {
+        let (q, p) = (event.q.as_ref(), event.p.as_ref());
+        Act::Impulse([-p[0], q[0]].into())
+    }
+    let run = Simulation::new(long).element(Mixed::<6>).step(0.1);
+    let beside = Simulation::new(two).element(Mixed::<6>).step(0.1);
+    (
+        run.impulse(0.8, [4.0, 0.5])
+            .on("fast", Crossing::Rising, back),
+        beside
+            .impulse(0.8, [4.0, 0.5])
+            .on("fast", Crossing::Rising, back),
+    )
+}
+
+/// A restitution that depends on a parameter, and a push that depends on the time.
+pub(super) fn throw(event: &Occurrence<'_, 0, RunTimeLength>) -> Act<0, RunTimeLength> {
+    let g = event.parameter("g").unwrap_or(f64::NAN);
+    let mut v = event.v.clone();
+    v[0] *= -0.08 * g;
+    v[1] += 0.3 * event.t;
+    Act::Restart(event.state_with_velocity(v))
+}
+
+/// A start with another value of one of its numbers, ordered (p, q).
+pub(super) fn moved(start: &FamilyState, column: usize, x: f64) -> FamilyState {
+    let mut moved = start.clone();
+    match column.checked_sub(start.p.len()) {
+        None => moved.p[column] = x,
+        Some(a) => moved.q[a] = x,
+    }
+    moved
+}
 
 #[track_caller]
 pub(super) fn check_same<const N: usize>(
@@ -180,12 +265,7 @@ pub(super) fn check_same<const N: usize>(
 #[test]
 fn derivatives_go_through_impacts() {
     let balls = balls(G);
-    let run = long(&balls).on("ground", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
-    let beside = fixed().on("ground", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
+    let (run, beside) = bouncing(&balls);
     let found = run.run_sensitive(balls.state(Y, V), 0.0..1.0);
     let found = found.expect("derivatives");
     assert!(found.motion().events().len() > 1);
@@ -205,14 +285,7 @@ fn derivatives_go_through_impacts() {
     let off = apart(&product, &found.by_start().last());
     assert!(off < SAME, "{off:e}");
     let expected = beside.run_linearised(THREE.state(Y, V), 0.0..1.0);
-    for (a, b) in matrices
-        .transitions()
-        .iter()
-        .zip(expected.expect("matrices").transitions())
-    {
-        let off = apart(a, b);
-        assert!(off < SAME, "{off:e}");
-    }
+    check_matrices(&matrices, &expected.expect("matrices"));
 }
 
 /// Compared with differences of whole runs, which have fewer correct digits: the rounding errors of a run, some 1e-13
@@ -221,24 +294,16 @@ fn derivatives_go_through_impacts() {
 fn derivatives_across_events_are_those_of_runs() {
     const DISTANCE: f64 = 1e-3;
     let start = balls(G).state(Y, V);
-    let bounce = |event: &tfe::Occurrence<'_, 0, RunTimeLength>| {
-        // A restitution that depends on a parameter, and a push that depends on the time.
-        let g = event.parameter("g").unwrap_or(f64::NAN);
-        let mut v = event.v.clone();
-        v[0] *= -0.08 * g;
-        v[1] += 0.3 * event.t;
-        Act::Restart(event.state_with_velocity(v))
-    };
     let end = |g: f64| {
         let balls = balls(g);
-        let run = long(&balls).on("ground", Crossing::Falling, bounce);
+        let run = long(&balls).on("ground", Crossing::Falling, throw);
         let motion = run.run(start.clone(), 0.0..1.0).expect("a run");
         let last = motion.last();
         [last.q.clone(), last.p.clone(), last.v.clone()].concat()
     };
     let expected = difference_over(DISTANCE, end, G);
     let own = balls(G);
-    let run = long(&own).on("ground", Crossing::Falling, bounce);
+    let run = long(&own).on("ground", Crossing::Falling, throw);
     let found = run.run_sensitive(start.clone(), 0.0..1.0);
     let found = found.expect("derivatives");
     let last = found.by("g").last();
@@ -247,17 +312,13 @@ fn derivatives_across_events_are_those_of_runs() {
     assert!(off < 1e-8, "{off:e}: {last:?} {expected:?}");
     // Derivatives by the start.
     let by_start = found.by_start().last();
+    let all = [&start.p[..], &start.q].concat();
     for column in 0..6 {
         let end = |x: f64| {
-            let mut start = start.clone();
-            match column {
-                0..3 => start.p[column] = x,
-                _ => start.q[column - 3] = x,
-            }
-            let motion = run.run(start, 0.0..1.0).expect("a run");
+            let motion = run.run(moved(&start, column, x), 0.0..1.0);
+            let motion = motion.expect("a run");
             [motion.last().p.clone(), motion.last().q.clone()].concat()
         };
-        let all = [start.p.clone(), start.q.clone()].concat();
         let expected = difference_over(DISTANCE, end, all[column]);
         let found: Vec<f64> = by_start.column(column).iter().copied().collect();
         let off = apart(&found, &expected);
@@ -269,32 +330,7 @@ fn derivatives_across_events_are_those_of_runs() {
 #[test]
 fn derivatives_go_to_events_that_end_the_run() {
     let balls = balls(G);
-    let run = long(&balls)
-        .on("ground", Crossing::Falling, |event| {
-            Act::Impulse(vec![-1.8 * event.p[0], 0.1, 0.0])
-        })
-        .on_function(
-            "high",
-            Crossing::Falling,
-            |_, y, v| v[2] + 0.1 * y[0],
-            |event| match event.t > 0.5 {
-                true => Act::Stop,
-                false => Act::Record,
-            },
-        );
-    let beside = fixed()
-        .on("ground", Crossing::Falling, |event| {
-            Act::Impulse([-1.8 * event.p[0], 0.1, 0.0])
-        })
-        .on_function(
-            "high",
-            Crossing::Falling,
-            |_, y, v| v[2] + 0.1 * y[0],
-            |event| match event.t > 0.5 {
-                true => Act::Stop,
-                false => Act::Record,
-            },
-        );
+    let (run, beside) = ending(&balls);
     let found = run.run_sensitive(balls.state(Y, V), 0.0..3.0);
     let found = found.expect("derivatives");
     assert!(found.motion().last().t < 2.9 && found.motion().events().len() > 1);
@@ -307,20 +343,7 @@ fn derivatives_go_to_events_that_end_the_run() {
 #[test]
 fn derivatives_by_momenta_go_through_events() {
     let (long, two, start) = by_momenta(0.4);
-    let run = Simulation::new(&long).element(Mixed::<6>).step(0.1);
-    let run = run.on("fast", Crossing::Rising, |event| {
-        Act::Restart(family::FamilyState {
-            q: event.q.clone(),
-            p: vec![-event.p[0], event.p[1] * event.q[0]],
-        })
-    });
-    let beside = Simulation::new(&two).element(Mixed::<6>).step(0.1);
-    let beside = beside.on("fast", Crossing::Rising, |event| {
-        Act::Restart(tfe::runtime::State {
-            q: event.q,
-            p: [-event.p[0], event.p[1] * event.q[0]],
-        })
-    });
+    let (run, beside) = turning(&long, &two);
     let found = run.run_sensitive(of_heap(&start), 0.0..4.0);
     let found = found.expect("derivatives");
     assert!(found.motion().events().len() > 1);
@@ -331,29 +354,23 @@ fn derivatives_by_momenta_go_through_events() {
 /// Parameters that are set at events: there are matrices if the values do not depend on the state.
 #[test]
 fn matrices_go_through_parameters_that_are_set() {
+    fn soften<const N: usize, L: Length<N>>(_: &Occurrence<'_, N, L>) -> Act<N, L> {
+        Act::Set(Settings::new("k", 20.0))
+    }
+    fn stiffen<const N: usize, L: Length<N>>(_: &Occurrence<'_, N, L>) -> Act<N, L> {
+        Act::Set(Settings::new("k", 60.0))
+    }
     let balls = balls(G);
-    let set =
-        |k: f64| move |_: &tfe::Occurrence<'_, 0, RunTimeLength>| Act::Set(Settings::new("k", k));
-    let run = long(&balls).on("ground", Crossing::Falling, set(20.0));
-    let run = run.on("ground", Crossing::Rising, set(60.0));
-    let beside = fixed()
-        .on("ground", Crossing::Falling, |_| {
-            Act::Set(Settings::new("k", 20.0))
-        })
-        .on("ground", Crossing::Rising, |_| {
-            Act::Set(Settings::new("k", 60.0))
-        });
+    let run = long(&balls).on("ground", Crossing::Falling, soften);
+    let run = run.on("ground", Crossing::Rising, stiffen);
+    let beside = fixed().on("ground", Crossing::Falling, soften);
+    let beside = beside.on("ground", Crossing::Rising, stiffen);
     let start = balls.state([0.1, 1.2, 2.0], [3.0, 2.0, 3.5]);
     let found = run.run_linearised(start.clone(), 0.0..1.0);
     let found = found.expect("matrices");
     assert!(!found.motion().settings().is_empty());
     let expected = beside.run_linearised(THREE.state([0.1, 1.2, 2.0], [3.0, 2.0, 3.5]), 0.0..1.0);
-    let expected = expected.expect("matrices");
-    assert_eq!(found.transitions().len(), expected.transitions().len());
-    for (a, b) in found.transitions().iter().zip(expected.transitions()) {
-        let off = apart(a, b);
-        assert!(off < SAME, "{off:e}");
-    }
+    check_matrices(&found, &expected.expect("matrices"));
     let error = run.run_sensitive(start.clone(), 0.0..1.0);
     let error = error.expect_err("derivatives by what is set");
     let call = "run_sensitive";
@@ -380,8 +397,8 @@ fn impulses_at_events_are_told() {
         limit: 0.5,
     };
     let run = Simulation::new(&balls).element(Mixed::<3>).step(0.5);
-    let bounce = |event: &tfe::Occurrence<'_, 0, RunTimeLength>| {
-        Act::Restart(family::FamilyState {
+    let bounce = |event: &Occurrence<'_, 0, RunTimeLength>| {
+        Act::Restart(FamilyState {
             q: event.q.clone(),
             p: vec![-event.p[0], event.p[1]],
         })
@@ -391,7 +408,7 @@ fn impulses_at_events_are_told() {
     let mut refused = 0;
     // The wall is met at the node at t = 1, or before or after it by a few rounding errors.
     for k in 0..32 {
-        let start = family::FamilyState {
+        let start = FamilyState {
             q: vec![1.0 - f64::from(k) * f64::EPSILON / 2.0, 1.0],
             p: vec![-1.0; 2],
         };
@@ -417,16 +434,7 @@ fn impulses_at_events_are_told() {
 #[test]
 fn derivatives_go_through_events_of_impulses() {
     let (long, two, start) = by_momenta(3.0);
-    let run = Simulation::new(&long).element(Mixed::<6>).step(0.1);
-    let run = run.impulse(0.8, [4.0, 0.5]);
-    let run = run.on("fast", Crossing::Rising, |event| {
-        Act::Impulse(vec![-event.p[0], event.q[0]])
-    });
-    let beside = Simulation::new(&two).element(Mixed::<6>).step(0.1);
-    let beside = beside.impulse(0.8, [4.0, 0.5]);
-    let beside = beside.on("fast", Crossing::Rising, |event| {
-        Act::Impulse([-event.p[0], event.q[0]])
-    });
+    let (run, beside) = kicked(&long, &two);
     let found = run.run_sensitive(of_heap(&start), 0.0..2.0);
     let found = found.expect("derivatives");
     assert_eq!(found.motion().events().len(), 1);

@@ -1,14 +1,16 @@
 //! Gradients and second derivatives across events that change the state or end the run: compared with those of the same
 //! model of fixed size, whose gradients are computed forwards, and with differences of runs.
 
-use crate::constrained::of_heap;
 use crate::differences::difference_over;
-use crate::events::{G, SAME, THREE, V, Y, apart, balls, by_momenta, fixed, long};
+use crate::events::{
+    G, THREE, V, Y, balls, bouncing, by_momenta, ending, kicked, long, moved, throw, turning,
+};
+use crate::lengths::{SAME, apart, of_heap};
 use tfe::error::RunErrorKind;
 use tfe::length::{Length, RunTimeLength};
 use tfe::prelude::*;
 use tfe::sensitivity::Loss;
-use tfe::{Model, family};
+use tfe::{Model, Occurrence, family};
 
 /// A function of coordinates, momenta and velocities at the end.
 fn of_end<'l, const N: usize, L: Length<N>>() -> Loss<'l, N, L> {
@@ -62,12 +64,7 @@ pub(super) fn check_same<M: family::Model, F: Model<N>, const N: usize>(
 #[test]
 fn gradients_go_through_impacts() {
     let balls = balls(G);
-    let run = long(&balls).on("ground", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
-    let beside = fixed().on("ground", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
+    let (run, beside) = bouncing(&balls);
     let start = THREE.state(Y, V);
     let events = check_same((&run, &beside), (&of_speeds(), &of_speeds()), (&start, 1.0));
     assert!(events > 1);
@@ -85,23 +82,15 @@ fn gradients_go_through_impacts() {
 fn gradients_across_events_are_differences_of_runs() {
     const DISTANCE: f64 = 1e-3;
     let start = balls(G).state(Y, V);
-    let bounce = |event: &tfe::Occurrence<'_, 0, RunTimeLength>| {
-        // A restitution that depends on a parameter, and a push that depends on the time.
-        let g = event.parameter("g").unwrap_or(f64::NAN);
-        let mut v = event.v.clone();
-        v[0] *= -0.08 * g;
-        v[1] += 0.3 * event.t;
-        Act::Restart(event.state_with_velocity(v))
-    };
     let value = |g: f64, start: &family::FamilyState| {
         let balls = balls(g);
-        let run = long(&balls).on("ground", Crossing::Falling, bounce);
+        let run = long(&balls).on("ground", Crossing::Falling, throw);
         let motion = run.run(start.clone(), 0.0..1.0).expect("a run");
         let last = motion.last();
         [last.q[0] * last.v[2] + last.p[1] + last.q[1] * last.q[1]]
     };
     let own = balls(G);
-    let run = long(&own).on("ground", Crossing::Falling, bounce);
+    let run = long(&own).on("ground", Crossing::Falling, throw);
     let loss = family::Loss::of_end(|q, p, v| q[0] * v[2] + p[1] + q[1] * q[1]);
     let found = run.gradient(start.clone(), 0.0..1.0, &loss);
     let (_, found) = found.expect("a gradient");
@@ -110,26 +99,14 @@ fn gradients_across_events_are_differences_of_runs() {
     let off = apart(&[found.by("g")], &by_g);
     assert!(off <= 1e-8, "{off:e}: {} {by_g:?}", found.by("g"));
     let by_start = found.by_start();
-    for a in 0..3 {
-        let moved = |by: &dyn Fn(&mut family::FamilyState)| {
-            let mut start = start.clone();
-            by(&mut start);
-            value(G, &start)
-        };
-        let by_q = difference_over(
-            DISTANCE,
-            |x| moved(&|start: &mut family::FamilyState| start.q[a] = x),
-            start.q[a],
-        );
-        let by_p = difference_over(
-            DISTANCE,
-            |x| moved(&|start: &mut family::FamilyState| start.p[a] = x),
-            start.p[a],
-        );
-        for (found, expected) in [(by_start.q[a], by_q), (by_start.p[a], by_p)] {
-            let off = apart(&[found], &expected);
-            assert!(off <= 1e-8, "{a}, {off:e}: {found} {expected:?}");
-        }
+    let by_start = [by_start.p, by_start.q].concat();
+    let all = [&start.p[..], &start.q].concat();
+    for column in 0..6 {
+        let of = |x: f64| value(G, &moved(&start, column, x));
+        let expected = difference_over(DISTANCE, of, all[column]);
+        let found = by_start[column];
+        let off = apart(&[found], &expected);
+        assert!(off <= 1e-8, "{column}, {off:e}: {found} {expected:?}");
     }
 }
 
@@ -137,32 +114,7 @@ fn gradients_across_events_are_differences_of_runs() {
 #[test]
 fn gradients_go_to_events_that_end_the_run() {
     let balls = balls(G);
-    let run = long(&balls)
-        .on("ground", Crossing::Falling, |event| {
-            Act::Impulse(vec![-1.8 * event.p[0], 0.1 * event.v[1], 0.0])
-        })
-        .on_function(
-            "high",
-            Crossing::Falling,
-            |_, y, v| v[2] + 0.1 * y[0],
-            |event| match event.t > 0.5 {
-                true => Act::Stop,
-                false => Act::Record,
-            },
-        );
-    let beside = fixed()
-        .on("ground", Crossing::Falling, |event| {
-            Act::Impulse([-1.8 * event.p[0], 0.1 * event.v[1], 0.0])
-        })
-        .on_function(
-            "high",
-            Crossing::Falling,
-            |_, y, v| v[2] + 0.1 * y[0],
-            |event| match event.t > 0.5 {
-                true => Act::Stop,
-                false => Act::Record,
-            },
-        );
+    let (run, beside) = ending(&balls);
     let start = THREE.state(Y, V);
     let losses = (&of_clocks(), &of_clocks());
     let events = check_same((&run, &beside), losses, (&start, 3.0));
@@ -172,39 +124,33 @@ fn gradients_go_to_events_that_end_the_run() {
 /// Several events at one time: two with one zero, and one whose function jumps over zero by the action of the others.
 #[test]
 fn gradients_go_through_events_at_one_time() {
+    fn slow<const N: usize, L: Length<N>>(event: &Occurrence<'_, N, L>) -> Act<N, L>
+    where
+        L::Vector: From<[f64; 3]>,
+    {
+        Act::Impulse([0.0, 0.1 * event.v.as_ref()[0], 0.05 * event.t].into())
+    }
+    fn lift<const N: usize, L: Length<N>>(event: &Occurrence<'_, N, L>) -> Act<N, L>
+    where
+        L::Vector: From<[f64; 3]>,
+    {
+        let (q, v) = (event.q.as_ref(), event.v.as_ref());
+        Act::Impulse([0.1 * v[0], 0.0, 0.2 * q[1]].into())
+    }
+    fn above<V: AsRef<[f64]>>(t: f64, y: &V, _: &V) -> f64 {
+        y.as_ref()[0] - 0.1 * t.sin()
+    }
+    fn rate<V: AsRef<[f64]>>(_: f64, _: &V, v: &V) -> f64 {
+        v.as_ref()[0]
+    }
     let balls = balls(G);
-    let run = long(&balls)
-        .on("ground", Crossing::Falling, |event| {
-            Act::Restart(event.after_impact(0.8))
-        })
-        .on_function(
-            "again",
-            Crossing::Falling,
-            |t, y, _| y[0] - 0.1 * t.sin(),
-            |event| Act::Impulse(vec![0.0, 0.1 * event.v[0], 0.05 * event.t]),
-        )
-        .on_function(
-            "turn",
-            Crossing::Rising,
-            |_, _, v| v[0],
-            |event| Act::Impulse(vec![0.1 * event.v[0], 0.0, 0.2 * event.q[1]]),
-        );
-    let beside = fixed()
-        .on("ground", Crossing::Falling, |event| {
-            Act::Restart(event.after_impact(0.8))
-        })
-        .on_function(
-            "again",
-            Crossing::Falling,
-            |t, y, _| y[0] - 0.1 * t.sin(),
-            |event| Act::Impulse([0.0, 0.1 * event.v[0], 0.05 * event.t]),
-        )
-        .on_function(
-            "turn",
-            Crossing::Rising,
-            |_, _, v| v[0],
-            |event| Act::Impulse([0.1 * event.v[0], 0.0, 0.2 * event.q[1]]),
-        );
+    let (run, beside) = bouncing(&balls);
+    let run = run
+        .on_function("again", Crossing::Falling, above, slow)
+        .on_function("turn", Crossing::Rising, rate, lift);
+    let beside = beside
+        .on_function("again", Crossing::Falling, above, slow)
+        .on_function("turn", Crossing::Rising, rate, lift);
     let start = THREE.state(Y, V);
     let motion = beside.run(start, 0.0..0.8).expect("a run");
     let pairs = motion.events().windows(2);
@@ -219,34 +165,12 @@ fn gradients_go_through_events_at_one_time() {
 #[test]
 fn gradients_by_momenta_go_through_events() {
     let (long, two, start) = by_momenta(0.4);
-    let run = Simulation::new(&long).element(Mixed::<6>).step(0.1);
-    let run = run.on("fast", Crossing::Rising, |event| {
-        Act::Restart(family::FamilyState {
-            q: event.q.clone(),
-            p: vec![-event.p[0], event.p[1] * event.q[0]],
-        })
-    });
-    let beside = Simulation::new(&two).element(Mixed::<6>).step(0.1);
-    let beside = beside.on("fast", Crossing::Rising, |event| {
-        Act::Restart(tfe::runtime::State {
-            q: event.q,
-            p: [-event.p[0], event.p[1] * event.q[0]],
-        })
-    });
+    let (run, beside) = turning(&long, &two);
     let events = check_same((&run, &beside), (&of_end(), &of_end()), (&start, 4.0));
     assert!(events > 1);
     // An event that an impulse causes has the time of the impulse, which does not change.
     let (long, two, start) = by_momenta(3.0);
-    let run = Simulation::new(&long).element(Mixed::<6>).step(0.1);
-    let run = run.impulse(0.8, [4.0, 0.5]);
-    let run = run.on("fast", Crossing::Rising, |event| {
-        Act::Impulse(vec![-event.p[0], event.q[0]])
-    });
-    let beside = Simulation::new(&two).element(Mixed::<6>).step(0.1);
-    let beside = beside.impulse(0.8, [4.0, 0.5]);
-    let beside = beside.on("fast", Crossing::Rising, |event| {
-        Act::Impulse([-event.p[0], event.q[0]])
-    });
+    let (run, beside) = kicked(&long, &two);
     let events = check_same((&run, &beside), (&of_end(), &of_end()), (&start, 2.0));
     assert_eq!(events, 1);
 }
@@ -255,12 +179,7 @@ fn gradients_by_momenta_go_through_events() {
 #[test]
 fn second_derivatives_go_through_impacts() {
     let balls = balls(G);
-    let run = long(&balls).on("ground", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
-    let beside = fixed().on("ground", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
+    let (run, beside) = bouncing(&balls);
     let start = THREE.state(Y, V);
     let names = ["g", "k", "a"];
     let found = run.hessian(of_heap(&start), 0.0..0.6, &of_end(), names);

@@ -1,12 +1,12 @@
 //! Periodic orbits with events of models of run-time length: compared with those of the same model of fixed size.
 
-use crate::constrained::of_heap;
-use crate::events::apart;
+use crate::lengths::{apart, bounce, of_both_lengths, of_heap};
 use std::f64::consts::TAU;
-use tfe::length::RunTimeLength;
-use tfe::periodic::{OrbitError, SensitiveOrbit};
+use tfe::family::FamilyState;
+use tfe::length::{Length, RunTimeLength};
+use tfe::periodic::{HybridOrbits, OrbitError, SensitiveOrbit};
 use tfe::prelude::*;
-use tfe::{HybridOrbit, family};
+use tfe::{HybridOrbit, Model, Occurrence, family};
 
 /// Oscillators coupled by springs, of which the first is driven and hits a wall.
 #[dynamics(
@@ -53,16 +53,16 @@ struct Pair {
     force(y[i]) = -c*dot(y[i]),
     event(wall) = w - x[0],
 )]
-struct OnCircles {
-    n: usize,
-    m: f64,
-    k: f64,
-    s: f64,
-    c: f64,
-    f: f64,
-    w: f64,
-    r: f64,
-    omega: f64,
+pub(super) struct OnCircles {
+    pub(super) n: usize,
+    pub(super) m: f64,
+    pub(super) k: f64,
+    pub(super) s: f64,
+    pub(super) c: f64,
+    pub(super) f: f64,
+    pub(super) w: f64,
+    pub(super) r: f64,
+    pub(super) omega: f64,
 }
 
 #[dynamics(
@@ -152,49 +152,49 @@ fn check_same<const N: usize>(
     }
 }
 
+/// The frequency of the force.
+const OMEGA: f64 = 2.6;
+
+/// Orbits of a driven model of run-time length that hits a wall.
+fn long_orbits<'m, M>(model: &'m M, guess: FamilyState) -> HybridOrbits<'m, M, 0, RunTimeLength>
+where
+    M: family::Model + Send + Sync,
+{
+    let run: Simulation<'m, M, 0, RunTimeLength> = Simulation::new(model);
+    let run = run
+        .element(Mixed::<8>)
+        .on("wall", Crossing::Falling, bounce);
+    PeriodicOrbit::of_simulation(&run)
+        .start_time(0.9)
+        .period(TAU / OMEGA)
+        .guess_from(guess)
+}
+
+/// The same of a model of fixed size.
+fn fixed_orbits<'m, M, const N: usize>(model: &'m M, guess: State<N>) -> HybridOrbits<'m, M, N>
+where
+    M: Model<N> + Send + Sync,
+{
+    let run: Simulation<'m, M, N> = Simulation::new(model);
+    let run = run
+        .element(Mixed::<8>)
+        .on("wall", Crossing::Falling, bounce);
+    PeriodicOrbit::of_simulation(&run)
+        .start_time(0.9)
+        .period(TAU / OMEGA)
+        .guess_from(guess)
+}
+
 #[test]
 fn orbits_with_impacts_are_those_of_fixed_size() {
-    let (m, k, s, c, f, w, omega) = (1.1, 1.2, 0.05, 0.1, 1.0, 0.05, 2.6);
-    let row = Row {
-        n: 2,
-        m,
-        k,
-        s,
-        c,
-        f,
-        w,
-        omega,
-    };
-    let pair = Pair {
-        m,
-        k,
-        s,
-        c,
-        f,
-        w,
-        omega,
-    };
+    let (m, k, s, c, f, w, omega) = (1.1, 1.2, 0.05, 0.1, 1.0, 0.05, OMEGA);
+    let (row, pair) = of_both_lengths!(Row(2), Pair: m, k, s, c, f, w, omega);
     let start = pair.state([-0.08, -0.01], [0.6, 0.0]);
-    let run = Simulation::new(&row).element(Mixed::<8>);
-    let run = run.on("wall", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
-    let beside = Simulation::new(&pair).element(Mixed::<8>);
-    let beside = beside.on("wall", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
-    let ours = PeriodicOrbit::of_simulation(&run)
-        .start_time(0.9)
-        .period(TAU / omega)
-        .guess_from(of_heap(&start));
-    let theirs = PeriodicOrbit::of_simulation(&beside)
-        .start_time(0.9)
-        .period(TAU / omega)
-        .guess_from(start);
-    let ours_found = ours.solve_sensitive().expect("an orbit");
-    let theirs_found = theirs.solve_sensitive().expect("an orbit");
-    check_same(&ours_found, &theirs_found);
-    assert!(ours_found.by_period().is_some());
+    let ours = long_orbits(&row, of_heap(&start));
+    let found = ours.solve_sensitive().expect("an orbit");
+    let expected = fixed_orbits(&pair, start).solve_sensitive();
+    check_same(&found, &expected.expect("an orbit"));
+    assert!(found.by_period().is_some());
     // A row of another length than the model.
     let error = ours.advance(vec![0.0; 3]).solve();
     let told = error
@@ -205,67 +205,35 @@ fn orbits_with_impacts_are_those_of_fixed_size() {
 
 #[test]
 fn orbits_with_impacts_and_constraints_are_those_of_fixed_size() {
-    let (m, k, s, c, f, w, r, omega) = (1.1, 1.2, 0.05, 0.1, 1.0, 0.05, 5.0, 2.6);
-    let row = OnCircles {
-        n: 2,
-        m,
-        k,
-        s,
-        c,
-        f,
-        w,
-        r,
-        omega,
-    };
-    let pair = PairOnCircles {
-        m,
-        k,
-        s,
-        c,
-        f,
-        w,
-        r,
-        omega,
-    };
+    let (m, k, s, c, f, w, r, omega) = (1.1, 1.2, 0.05, 0.1, 1.0, 0.05, 5.0, OMEGA);
+    let (row, pair) = of_both_lengths!(OnCircles(2), PairOnCircles: m, k, s, c, f, w, r, omega);
     // Near the circles, and not on them.
     let start = pair.state([-0.07, -0.01, -4.99, -5.0], [0.58, 0.0, 0.0, 0.0]);
-    let run = Simulation::new(&row).element(Mixed::<8>);
-    let run = run.on("wall", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
-    let beside = Simulation::new(&pair).element(Mixed::<8>);
-    let beside = beside.on("wall", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
-    let ours = PeriodicOrbit::of_simulation(&run)
-        .start_time(0.9)
-        .period(TAU / omega)
-        .guess_from(of_heap(&start));
-    let theirs = PeriodicOrbit::of_simulation(&beside)
-        .start_time(0.9)
-        .period(TAU / omega)
-        .guess_from(start);
-    let ours = ours.solve_sensitive().expect("an orbit");
-    let theirs = theirs.solve_sensitive().expect("an orbit");
-    check_same(&ours, &theirs);
-    assert_eq!(ours.orbit().multipliers().len(), 4, "no zeros");
-    let residual = ours.orbit().motion().constraint_residual();
+    let found = long_orbits(&row, of_heap(&start)).solve_sensitive();
+    let found = found.expect("an orbit");
+    let expected = fixed_orbits(&pair, start).solve_sensitive();
+    check_same(&found, &expected.expect("an orbit"));
+    assert_eq!(found.orbit().multipliers().len(), 4, "no zeros");
+    let residual = found.orbit().motion().constraint_residual();
     assert!(residual.position <= 1e-12, "{residual:?}");
 }
 
 #[test]
 fn orbits_of_unknown_period_are_those_of_fixed_size() {
+    fn kick<const N: usize, L: Length<N>>(event: &Occurrence<'_, N, L>) -> Act<N, L>
+    where
+        L::Vector: From<[f64; 1]>,
+    {
+        Act::Impulse([0.5 / (1.0 + event.v.as_ref()[0])].into())
+    }
     let (m, k, b, c) = (1.1, 1.2, 0.3, 0.1);
-    let (clocks, clock) = (Clocks { n: 1, m, k, b, c }, Clock { m, k, b, c });
+    let (clocks, clock) = of_both_lengths!(Clocks(1), Clock: m, k, b, c);
     let start = clock.state([0.8], [0.1]);
-    let run = Simulation::new(&clocks).element(Mixed::<8>);
-    let run: family::Simulation<'_, Clocks> = run.on("middle", Crossing::Rising, |event| {
-        Act::Impulse(vec![0.5 / (1.0 + event.v[0])])
-    });
+    let run: family::Simulation<'_, Clocks> = Simulation::new(&clocks);
+    let run = run.element(Mixed::<8>);
+    let run = run.on("middle", Crossing::Rising, kick);
     let beside = Simulation::new(&clock).element(Mixed::<8>);
-    let beside = beside.on("middle", Crossing::Rising, |event| {
-        Act::Impulse([0.5 / (1.0 + event.v[0])])
-    });
+    let beside = beside.on("middle", Crossing::Rising, kick);
     let ours = PeriodicOrbit::of_simulation(&run)
         .unknown_period(6.0)
         .guess_from(of_heap(&start));

@@ -11,5 +11,6 @@ mod constrained_events;
 mod events;
 mod gradients;
 mod hybrid;
+mod lengths;
 mod orbits;
 mod transitions;

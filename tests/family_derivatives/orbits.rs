@@ -2,6 +2,7 @@
 
 use crate::differences::difference;
 use crate::largest::larger;
+use crate::lengths::of_both_lengths;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 use tfe::AssemblyError;
@@ -90,6 +91,15 @@ struct Six {
     b: f64,
 }
 
+/// The largest difference of the numbers of two states.
+#[track_caller]
+fn states_apart<const N: usize>(long: &FamilyState, fixed: &State<N>) -> f64 {
+    assert_eq!((long.q.len(), long.p.len()), (N, N));
+    let places = long.q.iter().zip(&fixed.q);
+    let pairs = places.chain(long.p.iter().zip(&fixed.p));
+    pairs.fold(0.0, |most, (a, b)| larger(most, (a - b).abs()))
+}
+
 /// The distance of each number from the nearest of the others.
 fn apart(ones: &[Complex<f64>], others: &[Complex<f64>]) -> f64 {
     let nearest = |one: &Complex<f64>| {
@@ -102,25 +112,13 @@ fn apart(ones: &[Complex<f64>], others: &[Complex<f64>]) -> f64 {
 #[test]
 fn driven_orbits_are_those_of_fixed_size() {
     let (b, c, f, omega) = (0.8, 0.1, 0.4, 0.9);
-    let long = Driven {
-        n: 6,
-        b,
-        c,
-        f,
-        omega,
-    };
-    let six = DrivenSix { b, c, f, omega };
+    let (long, six) = of_both_lengths!(Driven(6), DrivenSix: b, c, f, omega);
     let one = PeriodicOrbit::of(&long).elements(24).period(TAU / omega);
     let one = one.solve().expect("an orbit");
     let other = PeriodicOrbit::of(&six).elements(24).period(TAU / omega);
     let other = other.solve().expect("an orbit");
-    for a in 0..6 {
-        let (q, p) = (
-            one.start().q[a] - other.start().q[a],
-            one.start().p[a] - other.start().p[a],
-        );
-        assert!(q.abs() < 1e-12 && p.abs() < 1e-12, "{a}: {q:e} {p:e}");
-    }
+    let off = states_apart(&one.start(), &other.start());
+    assert!(off < 1e-12, "{off:e}");
     let off = apart(one.multipliers(), other.multipliers());
     assert!(off < 1e-10, "{off:e}");
     assert!(one.is_stable() && one.trivial().is_empty() && one.unfolding().is_none());
@@ -132,10 +130,8 @@ fn driven_orbits_are_those_of_fixed_size() {
             motion.at(time).expect("inside"),
             fixed.at(time).expect("inside"),
         );
-        for a in 0..6 {
-            assert!((one.q[a] - other.q[a]).abs() < 1e-11);
-            assert!((one.p[a] - other.p[a]).abs() < 1e-11);
-        }
+        let off = states_apart(&one.state(), &other.state());
+        assert!(off < 1e-11, "{time}: {off:e}");
     }
     assert_eq!(motion.states().len(), 25);
     assert_eq!(one.nodes().len(), 25);
@@ -315,11 +311,8 @@ struct FourVanDerPol {
 
 #[test]
 fn isolated_orbits_of_unknown_period() {
-    let model = VanDerPol {
-        n: 4,
-        k: 0.3,
-        mu: 1.0,
-    };
+    let (k, mu) = (0.3, 1.0);
+    let (model, four) = of_both_lengths!(VanDerPol(4), FourVanDerPol: k, mu);
     let guess = model.state(vec![2.0; 4], vec![0.0; 4]);
     let orbit = PeriodicOrbit::of(&model)
         .element(Mixed::<6>)
@@ -337,7 +330,6 @@ fn isolated_orbits_of_unknown_period() {
     assert_eq!(orbit.trivial().len(), 1);
     let trivial = orbit.multipliers()[orbit.trivial()[0]];
     assert!((trivial - 1.0).norm() < 1e-9, "{trivial}");
-    let four = FourVanDerPol { k: 0.3, mu: 1.0 };
     let fixed = PeriodicOrbit::of(&four)
         .element(Mixed::<6>)
         .elements(40)
@@ -454,12 +446,9 @@ fn compare_slopes<const N: usize>(
     fixed: &OrbitSlopes<N>,
     allowed: f64,
 ) {
-    let (one, other) = (long.start(), fixed.start());
     assert!((long.period() - fixed.period()).abs() < allowed);
-    for a in 0..N {
-        let (q, p) = (one.q[a] - other.q[a], one.p[a] - other.p[a]);
-        assert!(q.abs() < allowed && p.abs() < allowed, "{a}: {q:e} {p:e}");
-    }
+    let off = states_apart(&long.start(), &fixed.start());
+    assert!(off < allowed, "{off:e}");
     let pairs = long.multipliers().iter().zip(fixed.multipliers());
     for (one, other) in pairs {
         let off = one.zip(*other).map(|(one, other)| (one - other).norm());
@@ -470,9 +459,7 @@ fn compare_slopes<const N: usize>(
 #[test]
 fn derivatives_of_orbits_are_those_of_fixed_size() {
     let (b, c, f, omega) = (0.8, 0.1, 0.4, 0.9);
-    let n = 6;
-    let long = Driven { n, b, c, f, omega };
-    let six = DrivenSix { b, c, f, omega };
+    let (long, six) = of_both_lengths!(Driven(6), DrivenSix: b, c, f, omega);
     let one = PeriodicOrbit::of(&long).elements(24).period(TAU / omega);
     let one = one.solve_sensitive().expect("an orbit");
     let other = PeriodicOrbit::of(&six).elements(24).period(TAU / omega);
@@ -484,9 +471,8 @@ fn derivatives_of_orbits_are_those_of_fixed_size() {
     let (by_period, fixed) = (one.by_period(), other.by_period());
     compare_slopes(by_period.expect("given"), fixed.expect("given"), 1e-9);
 
-    let four = FourVanDerPol { k: 0.3, mu: 1.0 };
-    let n = 4;
-    let long = VanDerPol { n, k: 0.3, mu: 1.0 };
+    let (k, mu) = (0.3, 1.0);
+    let (long, four) = of_both_lengths!(VanDerPol(4), FourVanDerPol: k, mu);
     let turning = Phase::Momentum {
         index: 0,
         value: 0.0,

@@ -1,7 +1,9 @@
 //! The transition operator of a model of run-time length: the derivative of a step.
 
 use crate::differences;
+use crate::hybrid::OnCircles;
 use crate::largest::larger;
+use crate::lengths::of_both_lengths;
 use tfe::family::{self, FamilyState};
 use tfe::length::RunTimeLength;
 use tfe::prelude::*;
@@ -71,18 +73,8 @@ const Q: [f64; 5] = [0.3, -0.2, 0.4, 0.1, -0.5];
 const V: [f64; 5] = [0.1, 0.5, -0.3, 0.2, 0.4];
 
 fn webs() -> (Web, WebOfFive) {
-    let (a, b, c, g) = (0.3, 0.2, 0.15, 0.1);
-    let m = MASSES.to_vec();
-    let long = Web {
-        n: 5,
-        m,
-        a,
-        b,
-        c,
-        g,
-    };
-    let m = MASSES;
-    (long, WebOfFive { m, a, b, c, g })
+    let (m, a, b, c, g) = (MASSES, 0.3, 0.2, 0.15, 0.1);
+    of_both_lengths!(Web(5), WebOfFive: m, a, b, c, g)
 }
 
 #[test]
@@ -111,8 +103,8 @@ fn matrices_are_those_of_fixed_size() {
             assert!((product - y).abs() < 1e-13);
         }
     }
-    let (m, c) = (MASSES.to_vec(), 0.3);
-    let (chain, five) = (ByMomenta { n: 5, m, c }, FiveByMomenta { m: MASSES, c });
+    let (m, c) = (MASSES, 0.3);
+    let (chain, five) = of_both_lengths!(ByMomenta(5), FiveByMomenta: m, c);
     let (start, fixed) = (chain.state(Q, V), five.state(Q, V));
     for element in [Element::mixed(3), Element::mixed(5), Element::radau(3)] {
         let one = transition_matrix(&chain, element, &start, 0.0, 0.2).expect("from the family");
@@ -333,36 +325,41 @@ fn what_is_impossible_is_told() {
 /// Backwards in time, an impulse is subtracted, and constraints react to the part of it that violates them.
 #[test]
 fn derivatives_go_back_across_impulses() {
-    #[dynamics(
-        coordinates(x[n], y[n]),
-        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - g*y[i]),
-        constraint(rod[i in 0..n]) = x[i]^2 + y[i]^2 - 1,
-    )]
-    struct Rods {
-        n: usize,
-        g: f64,
+    fn beads(k: f64) -> OnCircles {
+        OnCircles {
+            n: 2,
+            m: 1.0,
+            k,
+            s: 0.5,
+            c: 0.1,
+            f: 0.3,
+            w: 0.0,
+            r: 1.0,
+            omega: 2.6,
+        }
     }
-    fn run(rods: &Rods) -> Simulation<'_, Rods, 0, RunTimeLength> {
-        let run = Simulation::new(rods).element(Mixed::<6>).step(0.05);
-        run.impulse(-0.3, [0.7, 0.5])
+    fn run(beads: &OnCircles) -> Simulation<'_, OnCircles, 0, RunTimeLength> {
+        let run = Simulation::new(beads).element(Mixed::<6>).step(0.05);
+        run.impulse(-0.3, [0.7, 0.1, 0.5, 0.2])
     }
+    // Along the circles.
     let start = FamilyState {
-        q: vec![0.6, -0.8],
-        p: vec![0.4, 0.3],
+        q: vec![0.6, -0.6, -0.8, -0.8],
+        p: vec![0.4, 0.4, 0.3, -0.3],
     };
     let span = 0.0..-0.6;
-    let g = 9.81;
-    let end = |g: f64| {
-        let rods = Rods { n: 1, g };
-        let motion = run(&rods).run(start.clone(), span.clone()).expect("a run");
-        let last = motion.last();
-        [last.q[0], last.q[1], last.p[0], last.p[1]]
+    let k = 9.81;
+    let end = |k: f64| {
+        let beads = beads(k);
+        let motion = run(&beads).run(start.clone(), span.clone());
+        let motion = motion.expect("a run");
+        [&motion.last().q[..], &motion.last().p].concat()
     };
-    let expected = differences::difference(end, g);
-    let rods = Rods { n: 1, g };
-    let sensitive = run(&rods).run_sensitive(start.clone(), span.clone());
-    let found = sensitive.expect("a run").by("g").last();
-    let found = [found.q[0], found.q[1], found.p[0], found.p[1]];
+    let expected = differences::difference(end, k);
+    let beads = beads(k);
+    let sensitive = run(&beads).run_sensitive(start.clone(), span.clone());
+    let found = sensitive.expect("a run").by("k").last();
+    let found = [found.q, found.p].concat();
     let apart = |(a, b): (&f64, &f64)| (a - b).abs();
     let off = found.iter().zip(&expected).map(apart).fold(0.0, larger);
     // Differences have errors of about 1e-13 of the largest derivative, which is about one.
