@@ -232,15 +232,15 @@ fn derivatives_go_through_impacts() {
 /// t²/2 from rest.
 #[test]
 fn losses_of_the_time_of_an_event_move_with_it() {
-    #[dynamics(coordinates(y), lagrangian = dot(y)^2/2 - g*y, event(hit) = y, output(height) = y, output(clock) = t)]
-    struct Fall {
-        g: f64,
-    }
-    let fall = Fall { g: 10.0 };
-    let start = fall.state([1.0], [0.0]);
-    let run = Simulation::new(&fall)
+    let ball = Ball {
+        m: 1.0,
+        g: 10.0,
+        floor: 0.0,
+    };
+    let start = ball.state([1.0], [0.0]);
+    let run = Simulation::new(&ball)
         .step(0.1)
-        .on("hit", Crossing::Falling, |_| Act::Stop);
+        .on("impact", Crossing::Falling, |_| Act::Stop);
     let end = 0.2_f64.sqrt();
     let of_time: [Loss<'_, 1>; 2] = [
         Loss::output_at_end("clock"),
@@ -284,12 +284,14 @@ fn losses_of_the_time_of_an_event_move_with_it() {
     assert!(matches!(kind, RunErrorKind::Loss { .. }), "{kind}");
 }
 
+/// A mass without forces before a wall.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2, event(wall) = x - 0.12)]
+struct Free;
+
 /// If an event decides where an element ends, an impulse inside the element moves relative to it: this is refused, and
 /// with a node at the impulse the derivatives are right.
 #[test]
 fn impulses_beside_events_are_at_nodes() {
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, event(wall) = x - 0.12)]
-    struct Free;
     let start = Free.state([0.0], [1.0]);
     let run =
         Simulation::new(&Free)
@@ -309,8 +311,6 @@ fn impulses_beside_events_are_at_nodes() {
 /// Losses in micrometres are equivalent to those in metres.
 #[test]
 fn losses_of_small_numbers_have_their_gradients() {
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2)]
-    struct Free;
     for size in [1.0, 1e-6, 1e-12] {
         let run = Simulation::new(&Free).step(0.1);
         let loss = Loss::at_end(|node: &tfe::Node<1>| 1.0 / node.q[0]);
@@ -346,22 +346,14 @@ fn losses_of_small_numbers_have_their_gradients() {
 /// how the motion goes on from there, is one by its angle.
 #[test]
 fn derivatives_with_constraints_go_through_events_at_one_time() {
-    #[dynamics(
-        coordinates(x, y),
-        lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
-        constraint(rod) = x^2 + y^2 - 1,
-    )]
-    struct Rod {
-        m: f64,
-        g: f64,
-    }
     #[dynamics(coordinates(a), lagrangian = m/2*dot(a)^2 + m*g*cos(a))]
     struct Angle {
         m: f64,
         g: f64,
     }
     let (m, g) = (1.3, 9.81);
-    let (rod, angle) = (Rod { m, g }, Angle { m, g });
+    let (c, l) = (0.0, 1.0);
+    let (rod, angle) = (Rod { m, g, c, l }, Angle { m, g });
     // The wall, and at once a push along the circle that depends on the velocity.
     let run = Simulation::new(&rod).element(Mixed::<7>).step(0.02);
     let run = run

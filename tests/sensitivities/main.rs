@@ -220,6 +220,26 @@ struct Twice {
     l: f64,
 }
 
+/// A top with a fixed point and a drag: its attitude is a unit quaternion, the mass matrix is singular, and constraints
+/// determine the velocity of a momentum.
+#[dynamics(
+    coordinates(e[4]),
+    let w = body_rate(e),
+    lagrangian = (i1*w[0]^2 + i2*w[1]^2 + i3*w[2]^2)/2 - mgd*(e[0]^2 - e[1]^2 - e[2]^2 + e[3]^2),
+    force(e[0]) = -c*dot(e[0]),
+    constraint(unit) = (inner(e, e) - 1)/2,
+    output(w1) = w[0],
+    output(w2) = w[1],
+)]
+#[derive(Clone, Copy)]
+struct Top {
+    i1: f64,
+    i2: f64,
+    i3: f64,
+    mgd: f64,
+    c: f64,
+}
+
 /// A blade on a slope: a constraint on velocities whose direction rotates.
 #[dynamics(
     coordinates(x, y, phi),
@@ -239,6 +259,8 @@ struct Blade {
     lagrangian = m/2*dot(y)^2 - m*g*y,
     event(impact) = y - floor,
     output(velocity) = dot(y),
+    output(height) = y,
+    output(clock) = t,
 )]
 struct Ball {
     m: f64,

@@ -1,27 +1,12 @@
 //! Bodies described by unit quaternions: the mass matrix is singular, and constraints determine the velocity of a
 //! momentum.
 
+use crate::Top;
 use crate::differences::difference;
 use tfe::prelude::*;
 use tfe::sensitivity::Loss;
 
-#[dynamics(
-    coordinates(e[4]),
-    let w = body_rate(e),
-    lagrangian = (i1*w[0]^2 + i2*w[1]^2 + i3*w[2]^2)/2 - mgd*(e[0]^2 - e[1]^2 - e[2]^2 + e[3]^2),
-    constraint(unit) = (inner(e, e) - 1)/2,
-    output(w1) = w[0],
-    output(w2) = w[1],
-)]
-#[derive(Clone, Copy)]
-struct Top {
-    i1: f64,
-    i2: f64,
-    i3: f64,
-    mgd: f64,
-}
-
-/// The same with a time-dependent velocity constraint: the rate about the first axis is prescribed.
+/// A top without friction, with a time-dependent velocity constraint: the rate about the first axis is prescribed.
 #[dynamics(
     coordinates(e[4]),
     let w = body_rate(e),
@@ -113,7 +98,13 @@ fn check<M: tfe::Model<4> + Copy + Send + Sync>(model: M, parameter: &str, start
 #[test]
 fn velocities_outputs_and_losses_of_unit_quaternions() {
     let (i1, i2, i3, mgd) = (1.0, 1.3, 0.5, 1.0);
-    let top = Top { i1, i2, i3, mgd };
+    let top = Top {
+        i1,
+        i2,
+        i3,
+        mgd,
+        c: 0.0,
+    };
     let (e, rate) = start([0.3, -0.5, 4.0]);
     check(top, "mgd", top.state(e, rate));
     let b = 0.4;

@@ -121,22 +121,6 @@ fn off_constrained<M: Model<N> + Sync, const N: usize, const R: usize>(
     off(&run, start, f64::from(steps) * h, &end)
 }
 
-/// A top with a fixed point; its attitude is a unit quaternion.
-#[dynamics(
-    coordinates(e[4]),
-    let w = body_rate(e),
-    lagrangian = (i1*w[0]^2 + i2*w[1]^2 + i3*w[2]^2)/2 - mgd*(e[0]^2 - e[1]^2 - e[2]^2 + e[3]^2),
-    force(e[0]) = -c*dot(e[0]),
-    constraint(unit) = (inner(e, e) - 1)/2,
-)]
-struct Top {
-    i1: f64,
-    i2: f64,
-    i3: f64,
-    mgd: f64,
-    c: f64,
-}
-
 /// Two rods, the second hanging from the first: two constraints with parameters of their own.
 #[dynamics(
     coordinates(x, y, u, w),
