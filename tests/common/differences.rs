@@ -1,5 +1,7 @@
 //! Numerical derivatives by central differences of eighth order, for tests in which no exact reference exists.
 
+#![allow(dead_code)] // each test target uses its part
+
 /// The derivatives of several numbers with respect to `x`, with a spacing at which rounding errors of 1e-15 in the
 /// values lead to errors of about 1e-13.
 pub fn difference<T: AsMut<[f64]>>(of: impl Fn(f64) -> T, x: f64) -> T {

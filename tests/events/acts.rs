@@ -5,7 +5,7 @@ use crate::largest::larger;
 
 #[test]
 fn a_run_that_records_has_the_same_bits() {
-    let model = Oscillator { level: 0.3 };
+    let model = oscillator(0.3);
     let start = model.state([1.0], [0.2]);
     let simulation = Simulation::new(&model).step(0.3);
     let plain = simulation.run(start, 0.0..20.0).expect("a run");
@@ -26,7 +26,7 @@ fn a_run_that_records_has_the_same_bits() {
 
 #[test]
 fn a_run_stops_at_an_event() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let motion = Simulation::new(&model)
         .element(Mixed::<8>)
         .step(0.4)
@@ -43,7 +43,7 @@ fn a_run_stops_at_an_event() {
 /// An impulse that reverses the velocity at x = 0 turns the motion into |cos t|; the energy does not change.
 #[test]
 fn impulses_act_at_events() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let motion = Simulation::new(&model)
         .element(Mixed::<6>)
         .step(0.3)
@@ -103,7 +103,7 @@ fn misuse_is_told() {
 /// in the middle.
 #[test]
 fn events_set_parameters() {
-    let springs = Springs { m: 1.0, k: 4.0 };
+    let springs = spring(4.0);
     let side = |event: &tfe::Occurrence<'_, 1>| {
         let k = if event.rises { 4.0 } else { 1.0 };
         assert_eq!(event.parameter("k"), Some(5.0 - k));
@@ -173,7 +173,7 @@ fn events_set_parameters() {
 
 #[test]
 fn what_is_set_goes_together() {
-    let springs = Springs { m: 1.0, k: 1.0 };
+    let springs = spring(1.0);
     let run = |settings: Settings<1>| {
         Simulation::new(&springs)
             .element(Mixed::<8>)
@@ -203,7 +203,7 @@ fn what_is_set_goes_together() {
     let error = run(Settings::new("kk", 1.0)).expect_err("no parameter");
     assert_eq!(
         error.kind().to_string(),
-        "there is no parameter `kk`: the model has m, k"
+        "there is no parameter `kk`: the model has m, k, level"
     );
     let error = run(Settings::new("k", f64::NAN)).expect_err("not finite");
     assert!(matches!(error.kind(), RunErrorKind::Parameter { .. }));
@@ -253,6 +253,18 @@ fn steps_meet_the_events_of_a_run() {
     assert!((last.t - (2.0 / BALL.g).sqrt()).abs() < 1e-14);
 }
 
+/// A pendulum beside a wall.
+#[dynamics(
+    coordinates(theta),
+    lagrangian = m*l^2/2*dot(theta)^2 + m*g*l*cos(theta),
+    event(wall) = 0.3 - l*sin(theta),
+)]
+struct Angle {
+    m: f64,
+    l: f64,
+    g: f64,
+}
+
 #[test]
 fn impacts_are_consistent_with_constraints() {
     #[dynamics(
@@ -262,13 +274,6 @@ fn impacts_are_consistent_with_constraints() {
         event(wall) = 0.3 - x,
     )]
     struct Rod {
-        m: f64,
-        l: f64,
-        g: f64,
-    }
-
-    #[dynamics(coordinates(theta), lagrangian = m*l^2/2*dot(theta)^2 + m*g*l*cos(theta), event(wall) = 0.3 - l*sin(theta))]
-    struct Angle {
         m: f64,
         l: f64,
         g: f64,

@@ -25,38 +25,12 @@ fn matrices_go_across_impacts() {
     let plain = simulation.run(start, span.clone()).expect("a run");
     assert_eq!(plain.states(), run.motion().states());
     let product = run.product();
-    let end = |change: [f64; 4]| {
-        let moved = State {
-            q: [start.q[0] + change[2], start.q[1] + change[3]],
-            p: [start.p[0] + change[0], start.p[1] + change[1]],
-        };
-        let motion = simulation.run(moved, span.clone()).expect("a run");
+    let end = |start: State<2>| {
+        let motion = simulation.run(start, span.clone()).expect("a run");
         assert_eq!(motion.events().len(), plain.events().len());
-        let last = *motion.last();
-        [last.p[0], last.p[1], last.q[0], last.q[1]]
+        motion.last().state()
     };
-    for column in 0..4 {
-        let difference = |distance: f64| -> [f64; 4] {
-            let moved = |s: f64| {
-                let mut change = [0.0; 4];
-                change[column] = s;
-                end(change)
-            };
-            let (high, low) = (moved(distance), moved(-distance));
-            std::array::from_fn(|row| (high[row] - low[row]) / (2.0 * distance))
-        };
-        // Extrapolated differences, of fourth order.
-        let (far, near) = (difference(2e-5), difference(1e-5));
-        for row in 0..4 {
-            let expected = (4.0 * near[row] - far[row]) / 3.0;
-            let off = (product[(row, column)] - expected).abs();
-            assert!(
-                off < 1e-8 * product.amax(),
-                "({row}, {column}): {} for {expected}",
-                product[(row, column)]
-            );
-        }
-    }
+    check_columns(&product, 0..4, (start, 1e-5), end);
     // Without losses, impacts are symplectic.
     let elastic = Simulation::new(&pendulum)
         .element(Mixed::<6>)
@@ -78,7 +52,7 @@ fn matrices_go_across_impacts() {
 /// changes, so that there is no jump in the matrix (saltation): it is the product of two rotations.
 #[test]
 fn matrices_go_across_settings() {
-    let springs = Springs { m: 1.0, k: 4.0 };
+    let springs = spring(4.0);
     let simulation = Simulation::new(&springs).element(Mixed::<8>).step(0.1).on(
         "middle",
         Crossing::Either,
@@ -130,29 +104,10 @@ fn sections_are_events_with_matrices() {
         let point = point.expect("a point");
         product = point.transition().expect("linearised") * product;
     }
-    let end = |column: usize, s: f64| {
-        let mut moved = start;
-        match column.checked_sub(2) {
-            None => moved.p[column] += s,
-            Some(a) => moved.q[a] += s,
-        }
-        let point = points(moved).nth(4).expect("endless");
-        [point.p[0], point.p[1], point.q[0], point.q[1]]
-    };
     // The initial state lies on the section: after a change normal to it, the first crossing may be before the start,
     // or the start itself.
-    for column in [0, 1, 3] {
-        let difference =
-            |s: f64, row: usize| (end(column, s)[row] - end(column, -s)[row]) / (2.0 * s);
-        for row in 0..4 {
-            let expected = (4.0 * difference(1e-4, row) - difference(2e-4, row)) / 3.0;
-            let found = product[(row, column)];
-            assert!(
-                (found - expected).abs() < 1e-8 * product.amax(),
-                "({row}, {column}): {found} for {expected}"
-            );
-        }
-    }
+    let fifth = |start: State<2>| points(start).nth(4).expect("endless").state();
+    check_columns(&product, [0, 1, 3], (start, 5e-5), fifth);
     // In the coordinates y, p_y of the section the return map preserves the area at constant energy, and g remains
     // zero.
     assert!((0..4).all(|column| product[(2, column)].abs() < 1e-9 * product.amax()));
@@ -199,17 +154,6 @@ fn sections_with_constraints_have_matrices_of_the_motions_allowed() {
         }
         start(angles, rates)
     };
-    let numbers = |state: &State<4>| [state.p, state.q].concat();
-    let difference = |of: &dyn Fn(f64) -> Vec<f64>| -> Vec<f64> {
-        let pair = |h: f64| {
-            let (high, low) = (of(h), of(-h));
-            let pairs = high.into_iter().zip(low);
-            pairs.map(|(a, b)| (a - b) / (2.0 * h)).collect::<Vec<_>>()
-        };
-        let (near, far) = (pair(1e-3), pair(2e-3));
-        let both = near.into_iter().zip(far);
-        both.map(|(near, far)| (4.0 * near - far) / 3.0).collect()
-    };
     for (name, element) in [("place", Mixed::<6>.into()), ("turn", Element::mixed(8))] {
         let run = Simulation::new(&rods).element(element).step(0.04);
         let section = run.section(name, Crossing::Rising, moved(0, 0.0), 0.0);
@@ -224,12 +168,11 @@ fn sections_with_constraints_have_matrices_of_the_motions_allowed() {
                 let point = section.nth(2).expect("endless").expect("a point");
                 numbers(&point.state())
             };
-            let expected = difference(&third);
-            let begun = difference(&|s| numbers(&moved(which, s)));
+            let expected = difference_over(5e-4, third, 0.0);
+            let begun = difference_over(5e-4, |s| numbers(&moved(which, s)), 0.0);
             let found = &product * nalgebra::DVector::from_vec(begun);
             let size = expected.iter().fold(0.0_f64, |size, x| size.max(x.abs()));
             for (row, (found, expected)) in found.iter().zip(&expected).enumerate() {
-                // Differences of fourth order.
                 let off = (found - expected).abs();
                 assert!(
                     off < 1e-7 * size,
@@ -318,7 +261,7 @@ fn orbits_with_impacts_are_those_of_closed_forms() {
 /// Orbits that switch parameters, with unknown period: a spring that is stiffer on one side.
 #[test]
 fn orbits_with_settings_and_unknown_periods() {
-    let springs = Springs { m: 1.0, k: 4.0 };
+    let springs = spring(4.0);
     let simulation =
         Simulation::new(&springs)
             .element(Mixed::<8>)
@@ -348,7 +291,7 @@ fn orbits_with_settings_and_unknown_periods() {
 /// orbit.
 #[test]
 fn orbits_bring_parameters_back() {
-    let springs = Springs { m: 1.0, k: 1.0 };
+    let springs = spring(1.0);
     let simulation =
         Simulation::new(&springs)
             .element(Mixed::<8>)

@@ -243,7 +243,7 @@ fn events_at_the_very_end_are_all_met() {
 /// If an act moves the value of another event function across zero, this is not an event; if the motion does so, it is.
 #[test]
 fn acts_that_jump_over_zero_make_no_events() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let start = model.state([1.0], [0.0]);
     let names = |place: State<1>| {
         let run = Simulation::new(&model)
@@ -270,7 +270,7 @@ fn acts_that_jump_over_zero_make_no_events() {
 /// may not have vanished yet: this must not lead to another event, or to events without end.
 #[test]
 fn parameters_are_set_where_velocities_vanish() {
-    let springs = Springs { m: 1.0, k: 4.0 };
+    let springs = spring(4.0);
     let start = springs.state([0.5], [1.0]);
     for degree in [2, 3, 4, 6] {
         for step in [0.03, 0.05, 0.1] {
@@ -311,7 +311,7 @@ fn values_that_stay_at_zero_have_one_event() {
             x - 0.2 * x.signum()
         }
     }
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let start = model.state([1.0], [0.0]);
     let acts: [fn(&tfe::Occurrence<'_, 1>) -> Act<1>; 2] =
         [|_| Act::Record, |event| Act::Restart(event.state())];
@@ -337,7 +337,7 @@ fn values_that_stay_at_zero_have_one_event() {
 /// Events within rounding errors of a node leave a consistent motion: its elements end at its nodes.
 #[test]
 fn events_beside_nodes_leave_motions_whole() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let start = model.state([1.0], [0.0]);
     let simulation = Simulation::new(&model).element(Mixed::<6>).step(0.1);
     let plain = simulation.run(start, 0.0..1.0).expect("a run");
@@ -371,7 +371,7 @@ fn events_beside_nodes_leave_motions_whole() {
 /// An impulse at the time of an event that shortens its element acts once, before or after the event.
 #[test]
 fn impulses_at_the_times_of_events_act_once() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let start = model.state([1.0], [0.0]);
     for number in 0..200 {
         let time = 0.1 + 0.8 * (f64::from(number) * 0.618_033_988_749_895).fract();
@@ -399,7 +399,7 @@ fn impulses_at_the_times_of_events_act_once() {
 /// length. An impulse at the end of a run acts also if an event is there.
 #[test]
 fn impulses_at_nodes_are_events_at_nodes() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let start = model.state([1.0], [0.0]);
     let acts: [fn(&tfe::Occurrence<'_, 1>) -> Act<1>; 4] = [
         |_| Act::Record,
@@ -463,7 +463,7 @@ fn impulses_at_nodes_are_events_at_nodes() {
 /// Directions are those of the run.
 #[test]
 fn what_falls_in_a_run_back_in_time_is_falling() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let start = model.state([1.0], [0.0]);
     for (crossing, expected) in [
         (Crossing::Falling, vec![-0.5 * PI]),
@@ -489,7 +489,7 @@ fn what_falls_in_a_run_back_in_time_is_falling() {
 /// A run that begins or ends where a value is zero has not seen its sign change; a run that continues from there does.
 #[test]
 fn zeros_at_the_ends_of_runs() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let start = model.state([1.0], [0.0]);
     let simulation = Simulation::new(&model).element(Mixed::<6>).step(0.1);
     let plain = simulation.run(start, 0.0..1.0).expect("a run");
@@ -520,7 +520,7 @@ fn zeros_at_the_ends_of_runs() {
 /// repeated if the polynomial after the event begins with another velocity than the node.
 #[test]
 fn calls_at_the_end_of_a_run_are_not_made_again_behind_it() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     let start = model.state([1.0], [0.3]);
     let again = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.state());
     for nodes in [3, 4, 6] {
@@ -549,7 +549,7 @@ fn calls_at_the_end_of_a_run_are_not_made_again_behind_it() {
 /// within its error.
 #[test]
 fn zeros_at_the_start_are_no_events() {
-    let model = Oscillator { level: 0.0 };
+    let model = oscillator(0.0);
     // The velocity is −sin t.
     let start = model.state([1.0], [0.0]);
     for element in [

@@ -111,7 +111,7 @@ fn halves_of_runs_with_events() {
 /// After a run whose events have set parameters, the caller has no model with which to continue: this is an error.
 #[test]
 fn parts_of_ensembles_whose_events_set_parameters() {
-    let springs = Springs { m: 1.0, k: 4.0 };
+    let springs = spring(4.0);
     let starts = [[1.0], [0.0]].map(|v| springs.state([0.5], v));
     let ensemble = Ensemble::new(&springs)
         .step(0.1)
