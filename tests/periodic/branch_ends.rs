@@ -1,6 +1,7 @@
 //! Branches of periodic orbits that end where asked, those that stop, and questions without an answer.
 
-use crate::continuation::{Duffing, close};
+use crate::continuation::{HARDENING, close};
+use crate::models::Duffing;
 use std::f64::consts::TAU;
 use tfe::continuation::{ContinuationErrorKind, End};
 use tfe::periodic::OrbitError;
@@ -45,13 +46,7 @@ fn branches_run_backwards_and_end_where_asked() {
 
 #[test]
 fn questions_without_an_answer() {
-    let duffing = Duffing {
-        alpha: 1.0,
-        beta: 1.0,
-        delta: 0.1,
-        f: 0.5,
-        omega: 0.8,
-    };
+    let duffing = HARDENING;
     let period = |duffing: &Duffing| TAU / duffing.omega;
     let plain = || Continuation::of(&duffing).period(period);
     let omega = || plain().parameter(|duffing| &mut duffing.omega);
@@ -94,13 +89,7 @@ fn questions_without_an_answer() {
 
 #[test]
 fn a_branch_that_stops_is_kept_so_far() {
-    let duffing = Duffing {
-        alpha: 1.0,
-        beta: 1.0,
-        delta: 0.1,
-        f: 0.5,
-        omega: 0.8,
-    };
+    let duffing = HARDENING;
     let continuation = || {
         Continuation::of(&duffing)
             .parameter(|duffing| &mut duffing.omega)

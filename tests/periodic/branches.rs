@@ -1,6 +1,7 @@
 //! Branches of periodic orbits that end at rest, and in units of any size.
 
-use crate::continuation::{Pendulum, close, kinds};
+use crate::continuation::{close, kinds};
+use crate::models::PENDULUM;
 use std::f64::consts::TAU;
 use tfe::continuation::{Branch, ContinuationErrorKind, End, EventKind};
 use tfe::prelude::*;
@@ -22,7 +23,7 @@ struct Beside {
 /// Orbits of given energy, or of given period, shrink to the pendulum at rest. There are none beyond it.
 #[test]
 fn branches_end_where_their_orbits_come_to_rest() {
-    let pendulum = Pendulum { k: 1.0 };
+    let pendulum = PENDULUM;
     let continuation = || {
         Continuation::of(&pendulum)
             .parameter(|pendulum| &mut pendulum.k)

@@ -1,6 +1,7 @@
 //! Orbits of constrained models compared with those of equivalent models in minimal coordinates.
 
 use crate::common::larger;
+use crate::models::{Pendulum, agm};
 use std::f64::consts::{PI, TAU};
 use tfe::AssemblyError;
 use tfe::boundary::BoundaryError;
@@ -120,11 +121,7 @@ fn a_free_swing() {
     let (angle, rod) = (twins(0.0, 0.0, 0.0).0, Free { g: 1.0 });
     let amplitude = 1.2_f64;
     // 4 K(sin(0.6)) by the arithmetic-geometric mean.
-    let (mut x, mut y) = (1.0, 0.6_f64.cos());
-    for _ in 0..8 {
-        (x, y) = (0.5 * (x + y), (x * y).sqrt());
-    }
-    let period = TAU / x;
+    let period = TAU / agm(1.0, 0.6_f64.cos());
     let orbit = PeriodicOrbit::of(&rod)
         .element(Mixed::<6>)
         .elements(30)
@@ -302,16 +299,12 @@ fn a_swing_of_a_unit_quaternion() {
         mgd: f64,
         s: f64,
     }
-    #[dynamics(coordinates(theta), lagrangian = i1*dot(theta)^2/2 - mgd*cos(theta))]
-    struct Plane {
-        i1: f64,
-        mgd: f64,
-    }
     let (i1, i2, i3, mgd, s) = (1.2, 1.0, 0.9, 1.1, 0.7);
     let body = Body { i1, i2, i3, mgd, s };
-    let plane = Plane { i1, mgd };
-    let angle = std::f64::consts::PI + 1.0;
-    let half = angle / 2.0;
+    let plane = Pendulum { m: i1, k: mgd };
+    // About the lower position, while attitudes are about the upper one.
+    let angle = 1.0;
+    let half = (PI + angle) / 2.0;
     let start = body.state([half.cos(), half.sin(), 0.0, 0.0], [0.0; 4]);
     let guess = 6.7 * (i1 / mgd).sqrt();
     let ours = PeriodicOrbit::of(&body).element(Mixed::<6>).elements(40);
@@ -325,8 +318,8 @@ fn a_swing_of_a_unit_quaternion() {
     let (one, other) = (ours.orbit(), theirs.orbit());
     assert!((one.period() - other.period()).abs() < 1e-7);
     assert_eq!((one.multipliers().len(), one.trivial().len()), (6, 2));
-    for name in ["i1", "mgd"] {
-        let (ours, theirs) = (ours.by(name).period(), theirs.by(name).period());
+    for (name, other) in [("i1", "m"), ("mgd", "k")] {
+        let (ours, theirs) = (ours.by(name).period(), theirs.by(other).period());
         assert!((ours - theirs).abs() < 1e-6, "{name}: {ours} {theirs}");
     }
 }

@@ -2,28 +2,12 @@
 //! one by one.
 
 use crate::common::larger;
+use crate::models::{Duffing, HenonHeiles, PENDULUM, VanDerPol, pendulum_period};
 use nalgebra::Complex;
 use std::f64::consts::TAU;
 use tfe::continuation::{Branch, End, EventKind, Point};
 use tfe::periodic::Verdict;
 use tfe::prelude::*;
-
-#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - alpha/2*x^2 - beta/4*x^4,
-           force(x) = f*cos(omega*t) - delta*dot(x), sensitivity(omega, f))]
-#[derive(Clone)]
-pub(crate) struct Duffing {
-    pub(crate) alpha: f64,
-    pub(crate) beta: f64,
-    pub(crate) delta: f64,
-    pub(crate) f: f64,
-    pub(crate) omega: f64,
-}
-
-#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = mu*(1 - x^2)*dot(x), sensitivity(mu))]
-#[derive(Clone)]
-struct VanDerPol {
-    mu: f64,
-}
 
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2,
            force(x) = mu*(1 - x^2)*dot(x) + f*cos(omega*t), sensitivity(omega, f))]
@@ -34,30 +18,18 @@ struct ForcedVanDerPol {
     omega: f64,
 }
 
-/// The plane pendulum.
-#[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + k*cos(theta), sensitivity(k))]
-#[derive(Clone)]
-pub(crate) struct Pendulum {
-    pub(crate) k: f64,
-}
-
-#[dynamics(coordinates(x, y), momenta(px, py),
-           hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + a*(x^2*y - y^3/3), sensitivity(a))]
-#[derive(Clone)]
-struct HenonHeiles {
-    a: f64,
-}
+/// A hardening oscillator on one side of its resonance.
+pub(crate) const HARDENING: Duffing = Duffing {
+    alpha: 1.0,
+    beta: 1.0,
+    delta: 0.1,
+    f: 0.5,
+    omega: 0.8,
+};
 
 /// The response of the hardening oscillator over ω, from one side of the resonance to the other.
 fn response(elements: usize) -> Branch<Duffing, 1> {
-    let duffing = Duffing {
-        alpha: 1.0,
-        beta: 1.0,
-        delta: 0.1,
-        f: 0.5,
-        omega: 0.8,
-    };
-    Continuation::of(&duffing)
+    Continuation::of(&HARDENING)
         .parameter(|duffing| &mut duffing.omega)
         .range(0.8..3.5)
         .element(Mixed::<5>)
@@ -344,7 +316,7 @@ fn a_symmetric_response_meets_one_that_is_not() {
 
 #[test]
 fn a_limit_cycle_in_its_damping() {
-    let cycle = VanDerPol { mu: 1.0 };
+    let cycle = VanDerPol::unit(1.0);
     let branch = Continuation::of(&cycle)
         .parameter(|cycle| &mut cycle.mu)
         .range(1.0..5.0)
@@ -357,7 +329,7 @@ fn a_limit_cycle_in_its_damping() {
     assert!(branch.events().is_empty());
     assert!(branch.points().iter().all(Point::is_stable));
     let last = branch.points().last().expect("points");
-    let stiff = VanDerPol { mu: 5.0 };
+    let stiff = VanDerPol::unit(5.0);
     let alone = PeriodicOrbit::of(&stiff)
         .element(Mixed::<6>)
         .elements(200)
@@ -370,7 +342,7 @@ fn a_limit_cycle_in_its_damping() {
     close(last.period, alone.period(), 1e-10);
     assert_eq!(last.trivial.len(), 1);
     // The derivative of the period of the first orbit by the parameter, compared with its neighbour.
-    let near = VanDerPol { mu: 1.0 + 1e-5 };
+    let near = VanDerPol::unit(1.0 + 1e-5);
     let near = PeriodicOrbit::of(&near)
         .element(Mixed::<6>)
         .elements(200)
@@ -384,19 +356,9 @@ fn a_limit_cycle_in_its_damping() {
     close(tangent.period / tangent.parameter, difference, 1e-5);
 }
 
-/// The period of a pendulum with k and the energy H = p²/2 − k cos θ: 2π / (√k M(1, cos A/2)), where M is the
-/// arithmetic–geometric mean and cos A = −H/k.
-fn pendulum_period(k: f64, energy: f64) -> f64 {
-    let (mut a, mut b) = (1.0, (0.5 * (1.0 - energy / k)).sqrt());
-    while a - b > 1e-15 {
-        (a, b) = (0.5 * (a + b), (a * b).sqrt());
-    }
-    TAU / (k.sqrt() * a)
-}
-
 #[test]
 fn conservative_orbits_of_one_energy_or_one_period() {
-    let pendulum = Pendulum { k: 1.0 };
+    let pendulum = PENDULUM;
     let continuation = || {
         Continuation::of(&pendulum)
             .parameter(|pendulum| &mut pendulum.k)
@@ -409,7 +371,7 @@ fn conservative_orbits_of_one_energy_or_one_period() {
     let branch = continuation().unknown_period(7.0).run().expect("a branch");
     assert!(branch.events().is_empty());
     for point in branch.points() {
-        let expected = pendulum_period(point.parameter, energy);
+        let expected = pendulum_period([1.0, point.parameter], energy);
         // Eighth order with elements of length T/40.
         close(point.period, expected, 1e-9);
         assert_eq!(point.trivial.len(), 2);
@@ -419,7 +381,7 @@ fn conservative_orbits_of_one_energy_or_one_period() {
     for (k, point) in branch.points().iter().enumerate() {
         let orbit = branch.orbit(k).expect("an orbit");
         let energy = orbit.motion().energies()[0];
-        close(pendulum_period(point.parameter, energy), 7.0, 1e-8);
+        close(pendulum_period([1.0, point.parameter], energy), 7.0, 1e-8);
         assert!(
             orbit
                 .unfolding()

@@ -1,6 +1,6 @@
 //! Orders of periods and multipliers over the number of elements, for nonlinear orbits; and the cost.
 
-use crate::models::{Duffing, VanDerPol};
+use crate::models::{FORCED, VanDerPol, response};
 use std::f64::consts::TAU;
 use tfe::periodic::Phase;
 use tfe::prelude::*;
@@ -40,7 +40,7 @@ fn families(nodes: usize) -> Vec<(Element, f64)> {
 
 #[test]
 fn van_der_pol_period_and_multiplier() {
-    let model = VanDerPol { mu: 1.0 };
+    let model = VanDerPol::unit(1.0);
     for nodes in 2..=5 {
         for (element, order) in families(nodes) {
             let (mut periods, mut multipliers) = (Vec::new(), Vec::new());
@@ -68,13 +68,7 @@ fn van_der_pol_period_and_multiplier() {
 
 #[test]
 fn forced_duffing_multipliers() {
-    let model = Duffing {
-        alpha: 1.0,
-        beta: 1.0,
-        delta: 0.2,
-        f: 0.3,
-        omega: 1.4,
-    };
+    let model = FORCED;
     for nodes in 2..=5 {
         for (element, order) in families(nodes) {
             let mut errors = Vec::new();
@@ -83,7 +77,7 @@ fn forced_duffing_multipliers() {
                     .element(element)
                     .elements(elements)
                     .period(TAU / 1.4)
-                    .guess(|t| ([-0.3 * (1.4 * t).cos()], [0.42 * (1.4 * t).sin()]))
+                    .guess(response)
                     .solve()
                     .expect("an orbit");
                 let multiplier = orbit.multipliers()[0];
@@ -100,7 +94,7 @@ fn forced_duffing_multipliers() {
 /// tangent per element and point.
 #[test]
 fn the_work_is_linear_in_the_number_of_elements() {
-    let model = VanDerPol { mu: 1.0 };
+    let model = VanDerPol::unit(1.0);
     for elements in [10, 100, 1000, 10_000] {
         let orbit = PeriodicOrbit::of(&model)
             .element(Mixed::<5>)

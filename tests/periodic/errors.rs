@@ -1,7 +1,7 @@
 //! Invalid problems, and those without a solution, are typed errors.
 
 use crate::common::larger;
-use crate::models::{Duffing, Pendulum, Projectile, VanDerPol};
+use crate::models::{Duffing, FORCED, PENDULUM, Projectile, VanDerPol};
 use std::f64::consts::{PI, TAU};
 use tfe::boundary::{BoundaryError, Component};
 use tfe::periodic::{OrbitError, Phase};
@@ -10,14 +10,8 @@ use tfe::{AssemblyError, MeshError};
 
 #[test]
 fn orbits_that_are_ill_posed() {
-    let cycle = VanDerPol { mu: 1.0 };
-    let forced = Duffing {
-        alpha: 1.0,
-        beta: 1.0,
-        delta: 0.2,
-        f: 0.3,
-        omega: 1.4,
-    };
+    let cycle = VanDerPol::unit(1.0);
+    let forced = FORCED;
     let circle = |t: f64| ([2.0 * t.cos()], [-2.0 * t.sin()]);
     let problem = || PeriodicOrbit::of(&cycle).guess(circle);
     assert!(matches!(problem().solve(), Err(OrbitError::NoPeriod)));
@@ -77,7 +71,7 @@ fn orbits_that_are_ill_posed() {
 /// The energy is determined otherwise: by the period, or by forces.
 #[test]
 fn an_energy_that_does_not_decide_is_refused() {
-    let (pendulum, cycle) = (Pendulum {}, VanDerPol { mu: 1.0 });
+    let (pendulum, cycle) = (PENDULUM, VanDerPol::unit(1.0));
     let known = PeriodicOrbit::of(&pendulum)
         .period(7.0)
         .energy(-0.5)
@@ -98,11 +92,11 @@ fn an_energy_that_does_not_decide_is_refused() {
 
 #[test]
 fn orbits_that_do_not_exist() {
-    let pendulum = Pendulum {};
+    let pendulum = PENDULUM;
     let rest = PeriodicOrbit::of(&pendulum).unknown_period(6.0).solve();
     // Every time is a period of an equilibrium, so that no period is distinguished.
     assert!(matches!(rest, Err(OrbitError::AtRest)));
-    let far = VanDerPol { mu: 1.0 };
+    let far = VanDerPol::unit(1.0);
     let error = PeriodicOrbit::of(&far)
         .unknown_period(6.0)
         .guess(|t| ([2.0 * t.cos()], [-2.0 * t.sin()]))
@@ -144,7 +138,7 @@ fn orbits_that_do_not_exist() {
 /// guess is there or the search leads there.
 #[test]
 fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
-    let pendulum = Pendulum {};
+    let pendulum = PENDULUM;
     let turning = Phase::Momentum {
         index: 0,
         value: 0.0,
@@ -170,7 +164,7 @@ fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
         assert_eq!(rest.err(), Some(OrbitError::AtRest), "{angle}");
     }
     for mu in [1.0, -0.2] {
-        let oscillator = VanDerPol { mu };
+        let oscillator = VanDerPol::unit(mu);
         let simulation = Simulation::new(&oscillator);
         let near = |amplitude: f64, period: f64| {
             PeriodicOrbit::of_simulation(&simulation)
@@ -205,7 +199,7 @@ fn a_state_of_rest_is_no_orbit_of_an_unknown_period() {
 /// With a given period, the equilibrium is an orbit: see `a_saddle_of_a_simulation_is_unstable`, too.
 #[test]
 fn multipliers_of_an_equilibrium() {
-    let pendulum = Pendulum {};
+    let pendulum = PENDULUM;
     let hanging = PeriodicOrbit::of(&pendulum)
         .element(Mixed::<6>)
         .elements(10)

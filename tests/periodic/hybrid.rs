@@ -1,7 +1,28 @@
 //! Periodic orbits with events of models with constraints, compared with the same motion in a minimal coordinate.
 
 use std::f64::consts::TAU;
+use tfe::periodic::HybridOrbits;
 use tfe::prelude::*;
+
+/// Orbits of a model that hits a wall, after which 0.8 of the speed is left.
+pub(crate) fn impacting<'m, M, const N: usize>(
+    model: &'m M,
+    period: f64,
+    guess: State<N>,
+) -> HybridOrbits<'m, M, N>
+where
+    M: Model<N> + Send + Sync,
+{
+    let run: Simulation<'m, M, N> = Simulation::new(model);
+    let run = run.element(Mixed::<8>);
+    let run = run.on("wall", Crossing::Falling, |event| {
+        Act::Restart(event.after_impact(0.8))
+    });
+    PeriodicOrbit::of_simulation(&run)
+        .start_time(0.9)
+        .period(period)
+        .guess_from(guess)
+}
 
 /// A driven bead on a circle that hits a wall once per period, by its place and by its angle.
 #[dynamics(
@@ -59,27 +80,12 @@ fn orbits_with_impacts_and_constraints_are_those_of_a_minimal_coordinate() {
         r,
         omega,
     };
-    let run = Simulation::new(&bead).element(Mixed::<8>);
-    let run = run.on("wall", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
     // Near the circle, and not on it.
-    let found = PeriodicOrbit::of_simulation(&run)
-        .start_time(0.9)
-        .period(TAU / omega)
-        .guess_from(bead.state([-0.07, -4.99], [0.58, 0.0]))
-        .solve_sensitive()
-        .expect("an orbit");
-    let beside = Simulation::new(&angle).element(Mixed::<8>);
-    let beside = beside.on("wall", Crossing::Falling, |event| {
-        Act::Restart(event.after_impact(0.8))
-    });
-    let expected = PeriodicOrbit::of_simulation(&beside)
-        .start_time(0.9)
-        .period(TAU / omega)
-        .guess_from(angle.state([-0.014], [0.117]))
-        .solve_sensitive()
-        .expect("an orbit");
+    let start = bead.state([-0.07, -4.99], [0.58, 0.0]);
+    let found = impacting(&bead, TAU / omega, start).solve_sensitive();
+    let start = angle.state([-0.014], [0.117]);
+    let expected = impacting(&angle, TAU / omega, start).solve_sensitive();
+    let (found, expected) = (found.expect("an orbit"), expected.expect("an orbit"));
     let (orbit, other) = (found.orbit(), expected.orbit());
     assert_eq!(orbit.motion().events().len(), 1);
     assert_eq!(other.motion().events().len(), 1);

@@ -1,15 +1,24 @@
 //! The models of these tests.
 
+use std::f64::consts::TAU;
 use tfe::prelude::*;
 
-#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = mu*(1 - x^2)*dot(x))]
+#[dynamics(coordinates(x), lagrangian = m*(dot(x)^2 - x^2)/2, force(x) = m*mu*(1 - x^2)*dot(x), sensitivity(mu))]
 #[derive(Clone)]
 pub struct VanDerPol {
+    pub m: f64,
     pub mu: f64,
 }
 
+impl VanDerPol {
+    /// With a mass of one.
+    pub const fn unit(mu: f64) -> Self {
+        Self { m: 1.0, mu }
+    }
+}
+
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - alpha/2*x^2 - beta/4*x^4,
-           force(x) = f*cos(omega*t) - delta*dot(x))]
+           force(x) = f*cos(omega*t) - delta*dot(x), sensitivity(omega, f))]
 #[derive(Clone)]
 pub struct Duffing {
     pub alpha: f64,
@@ -17,6 +26,19 @@ pub struct Duffing {
     pub delta: f64,
     pub f: f64,
     pub omega: f64,
+}
+
+/// The oscillator of `tests/reference/periodic.json`, with its response to the force as guess.
+pub const FORCED: Duffing = Duffing {
+    alpha: 1.0,
+    beta: 1.0,
+    delta: 0.2,
+    f: 0.3,
+    omega: 1.4,
+};
+
+pub fn response(t: f64) -> ([f64; 1], [f64; 1]) {
+    ([-0.3 * (1.4 * t).cos()], [0.42 * (1.4 * t).sin()])
 }
 
 /// A rigid flapping blade in forward flight; the azimuth angle is the time.
@@ -75,9 +97,29 @@ pub struct TurningSaddle {
     pub w: f64,
 }
 
-#[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 + cos(theta))]
+/// The plane pendulum.
+#[dynamics(coordinates(theta), lagrangian = m*dot(theta)^2/2 + k*cos(theta), sensitivity(k))]
 #[derive(Clone)]
-pub struct Pendulum {}
+pub struct Pendulum {
+    pub m: f64,
+    pub k: f64,
+}
+
+pub const PENDULUM: Pendulum = Pendulum { m: 1.0, k: 1.0 };
+
+/// The arithmetic–geometric mean.
+pub fn agm(mut a: f64, mut b: f64) -> f64 {
+    for _ in 0..10 {
+        (a, b) = (0.5 * (a + b), (a * b).sqrt());
+    }
+    a
+}
+
+/// The period 2π √(m/k) / M(1, cos A/2) of a pendulum with the energy H = p²/2m − k cos θ, where M is the
+/// arithmetic–geometric mean and k cos A = −H.
+pub fn pendulum_period([m, k]: [f64; 2], energy: f64) -> f64 {
+    TAU * (m / k).sqrt() / agm(1.0, (0.5 * (1.0 - energy / k)).sqrt())
+}
 
 #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y)]
 pub struct Projectile {
@@ -85,5 +127,8 @@ pub struct Projectile {
 }
 
 #[dynamics(coordinates(x, y), momenta(px, py),
-           hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + x^2*y - y^3/3)]
-pub struct HenonHeiles {}
+           hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + a*(x^2*y - y^3/3), sensitivity(a))]
+#[derive(Clone)]
+pub struct HenonHeiles {
+    pub a: f64,
+}

@@ -2,7 +2,7 @@
 
 use crate::common::{case, list, number, numbers};
 use crate::models::{
-    Blade, Duffing, HenonHeiles, Mathieu, Pendulum, Shaft, TurningSaddle, VanDerPol,
+    Blade, FORCED, HenonHeiles, Mathieu, PENDULUM, Shaft, TurningSaddle, VanDerPol, agm, response,
 };
 use nalgebra::Complex;
 use serde_json::Value;
@@ -63,7 +63,7 @@ fn limit_cycle(model: &VanDerPol, element: Element, elements: usize) -> Orbit<'_
 #[test]
 fn van_der_pol() {
     let case = case("periodic", "van_der_pol_mu1");
-    let model = VanDerPol { mu: 1.0 };
+    let model = VanDerPol::unit(1.0);
     for (element, elements) in [
         (Element::mixed(8), 40),
         (Element::primal(8), 40),
@@ -85,7 +85,7 @@ fn van_der_pol() {
 
 #[test]
 fn the_phase_is_that_of_the_guess_unless_one_is_chosen() {
-    let model = VanDerPol { mu: 1.0 };
+    let model = VanDerPol::unit(1.0);
     let chosen = limit_cycle(&model, Element::mixed(6), 60);
     let start = chosen.start();
     let free = PeriodicOrbit::of(&model)
@@ -117,18 +117,12 @@ fn the_phase_is_that_of_the_guess_unless_one_is_chosen() {
 #[test]
 fn forced_duffing() {
     let case = case("periodic", "duffing_forced");
-    let model = Duffing {
-        alpha: 1.0,
-        beta: 1.0,
-        delta: 0.2,
-        f: 0.3,
-        omega: 1.4,
-    };
+    let model = FORCED;
     let orbit = PeriodicOrbit::of(&model)
         .element(Mixed::<8>)
         .elements(24)
         .period(TAU / 1.4)
-        .guess(|t| ([-0.3 * (1.4 * t).cos()], [0.42 * (1.4 * t).sin()]))
+        .guess(response)
         .solve()
         .expect("an orbit");
     let initial = numbers(&case["initial"]);
@@ -300,16 +294,12 @@ fn tiny_and_huge_multipliers_in_one_orbit() {
 
 /// 4 K(k), by the arithmetic–geometric mean.
 fn pendulum_period(amplitude: f64) -> f64 {
-    let (mut a, mut b) = (1.0, (amplitude / 2.0).cos());
-    for _ in 0..8 {
-        (a, b) = (0.5 * (a + b), (a * b).sqrt());
-    }
-    TAU / a
+    TAU / agm(1.0, (amplitude / 2.0).cos())
 }
 
 #[test]
 fn conservative_orbits_by_energy_and_by_period() {
-    let pendulum = Pendulum {};
+    let pendulum = PENDULUM;
     for amplitude in [0.5_f64, 2.0, 3.0] {
         let period = pendulum_period(amplitude);
         let guess = move |t: f64| {
@@ -351,7 +341,7 @@ fn conservative_orbits_by_energy_and_by_period() {
 
 #[test]
 fn an_angle_that_turns() {
-    let pendulum = Pendulum {};
+    let pendulum = PENDULUM;
     // p²/2 − cos θ = 2: T = ∫ dθ / √(2(2 + cos θ)); the trapezoidal rule converges geometrically.
     let points = 64;
     let sum: f64 = (0..points)
@@ -374,7 +364,7 @@ fn an_angle_that_turns() {
 fn a_hamiltonian_orbit_with_an_elliptic_neighbourhood() {
     // A symmetric orbit of the Hénon–Heiles system on the axis x = 0 with E = 1/12; the variation in x obeys a Hill
     // equation.
-    let model = HenonHeiles {};
+    let model = HenonHeiles { a: 1.0 };
     let orbit = PeriodicOrbit::of(&model)
         .element(Mixed::<8>)
         .elements(40)
@@ -437,7 +427,7 @@ impl Hill<'_> {
 /// One or two elements of high degree: here too, the phase remains that of the guess.
 #[test]
 fn one_element_or_two_over_a_period() {
-    let model = VanDerPol { mu: 0.2 };
+    let model = VanDerPol::unit(0.2);
     let many = limit_cycle(&model, Element::mixed(8), 40);
     // With 11 Gauss points each, the periods are 6.300093 and 6.298876885.
     for (elements, tolerance) in [(1, 4e-4), (2, 1e-7)] {
@@ -460,7 +450,7 @@ fn one_element_or_two_over_a_period() {
             assert_eq!(few.trivial(), [0]);
         }
     }
-    let pendulum = Pendulum {};
+    let pendulum = PENDULUM;
     let amplitude = 0.5_f64;
     let period = pendulum_period(amplitude);
     let guess = move |t: f64| {
@@ -487,7 +477,7 @@ fn one_element_or_two_over_a_period() {
 
 #[test]
 fn graded_elements_serve_a_relaxation_oscillation() {
-    let model = VanDerPol { mu: 10.0 };
+    let model = VanDerPol::unit(10.0);
     let start = Simulation::new(&model)
         .element(Mixed::<6>)
         .step(0.01)
@@ -526,13 +516,7 @@ fn graded_elements_serve_a_relaxation_oscillation() {
 
 #[test]
 fn the_motion_of_an_orbit_is_the_stepped_one() {
-    let model = Duffing {
-        alpha: 1.0,
-        beta: 1.0,
-        delta: 0.2,
-        f: 0.3,
-        omega: 1.4,
-    };
+    let model = FORCED;
     for element in [
         Element::mixed(4),
         Element::primal(4),
@@ -543,7 +527,7 @@ fn the_motion_of_an_orbit_is_the_stepped_one() {
             .element(element)
             .elements(20)
             .period(TAU / 1.4)
-            .guess(|t| ([-0.3 * (1.4 * t).cos()], [0.42 * (1.4 * t).sin()]))
+            .guess(response)
             .solve()
             .expect("an orbit");
         let stepped = Simulation::new(&model)

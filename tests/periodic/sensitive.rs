@@ -1,7 +1,9 @@
 //! Derivatives of periodic orbits and of boundary-value problems, compared with differences of solutions.
 
 use crate::differences::{difference, difference_over};
-use crate::models::{Duffing, VanDerPol};
+use crate::hybrid::impacting;
+use crate::models::{Duffing, Pendulum, VanDerPol, pendulum_period as period};
+use nalgebra::Complex;
 use std::f64::consts::TAU;
 use tfe::boundary::Component::{Coordinate, Momentum};
 use tfe::boundary::SensitiveBoundaryMotion;
@@ -18,28 +20,23 @@ fn close(found: f64, expected: f64, allowed: f64) {
 }
 
 /// The period, the initial state and one of the multipliers, as numbers.
+fn row(period: f64, start: State<1>, multiplier: Complex<f64>) -> [f64; 5] {
+    let (q, p) = (start.q[0], start.p[0]);
+    [period, q, p, multiplier.re, multiplier.im]
+}
+
 fn of_orbit<M: Model<1>>(orbit: &PeriodicOrbit<'_, M, 1>, place: usize) -> [f64; 5] {
     let orbit = orbit.solve().expect("an orbit");
-    let (start, multiplier) = (orbit.start(), orbit.multipliers()[place]);
-    [
-        orbit.period(),
-        start.q[0],
-        start.p[0],
-        multiplier.re,
-        multiplier.im,
-    ]
+    row(orbit.period(), orbit.start(), orbit.multipliers()[place])
 }
 
 fn of_slopes(slopes: &OrbitSlopes<1>, place: usize) -> [f64; 5] {
-    let start = slopes.start();
     let multiplier = slopes.multipliers()[place].expect("it stands alone");
-    [
-        slopes.period(),
-        start.q[0],
-        start.p[0],
-        multiplier.re,
-        multiplier.im,
-    ]
+    row(slopes.period(), slopes.start(), multiplier)
+}
+
+fn of_hybrid(orbit: &HybridOrbit<1>, place: usize) -> [f64; 5] {
+    row(orbit.period(), orbit.start(), orbit.multipliers()[place])
 }
 
 /// A tight tolerance, so that differences contain rounding errors only.
@@ -71,15 +68,15 @@ fn a_limit_cycle_by_its_damping() {
             .unknown_period(6.7)
             .phase(turning)
     }
-    let model = VanDerPol { mu: 0.8 };
+    let model = VanDerPol::unit(0.8);
     let s = cycle(&model).solve_sensitive().expect("an orbit");
     let trivial = s.orbit().trivial();
     assert_eq!(trivial.len(), 1);
     let other = 1 - trivial[0];
-    let expected = difference(|mu| of_orbit(&cycle(&VanDerPol { mu }), other), 0.8);
+    let expected = difference(|mu| of_orbit(&cycle(&VanDerPol::unit(mu)), other), 0.8);
     compare(of_slopes(s.by("mu"), other), expected, 1e-10);
     let zero = s.by("mu").multipliers()[trivial[0]];
-    assert_eq!(zero.map(nalgebra::Complex::norm), Some(0.0));
+    assert_eq!(zero.map(Complex::norm), Some(0.0));
     assert!(s.by_period().is_none() && s.get("nu").is_none());
 }
 
@@ -143,27 +140,11 @@ fn multipliers_by_a_parameter_next_to_zero() {
     }
 }
 
-#[dynamics(coordinates(theta), lagrangian = m*dot(theta)^2/2 + k*cos(theta))]
-#[derive(Clone)]
-struct Swing {
-    m: f64,
-    k: f64,
-}
-
-/// The period 2π √(m/k) / M(1, cos A/2), where M is the arithmetic–geometric mean and k cos A = −E.
-fn period([m, k]: [f64; 2], energy: f64) -> f64 {
-    let (mut a, mut b) = (1.0, (0.5 * (1.0 - energy / k)).sqrt());
-    while a - b > 1e-15 {
-        (a, b) = (0.5 * (a + b), (a * b).sqrt());
-    }
-    TAU * (m / k).sqrt() / a
-}
-
 /// Orbits of a conservative model form families: with given energy the period changes, with given period the energy.
 #[test]
 fn a_free_swing_at_one_energy_and_at_one_period() {
     let (m, k, energy) = (1.1, 1.3, -0.5);
-    let model = Swing { m, k };
+    let model = Pendulum { m, k };
     let swing = || tight(&model, model.state([1.2], [0.0]));
     let at_energy = swing().energy(energy).unknown_period(7.0);
     let s = at_energy.solve_sensitive().expect("an orbit");
@@ -424,29 +405,11 @@ struct Clock {
     c: f64,
 }
 
-fn of_hybrid(orbit: &HybridOrbit<1>, place: usize) -> [f64; 5] {
-    let (start, multiplier) = (orbit.start(), orbit.multipliers()[place]);
-    [
-        orbit.period(),
-        start.q[0],
-        start.p[0],
-        multiplier.re,
-        multiplier.im,
-    ]
-}
-
 #[test]
 fn orbits_with_impacts_by_all_parameters() {
     fn orbits(model: &Impacting) -> HybridOrbits<'_, Impacting, 1> {
-        let bounce = |event: &tfe::Occurrence<'_, 1>| Act::Restart(event.after_impact(0.8));
-        let simulation =
-            Simulation::new(model)
-                .element(Mixed::<8>)
-                .on("wall", Crossing::Falling, bounce);
-        PeriodicOrbit::of_simulation(&simulation)
-            .start_time(0.9)
-            .period(TAU / model.omega)
-            .guess_from(model.state([-0.41], [0.3]))
+        let guess = model.state([-0.41], [0.3]);
+        impacting(model, TAU / model.omega, guess)
     }
     let model = Impacting {
         m: 1.1,

@@ -1,7 +1,7 @@
 //! The units of mass, length and time must not matter.
 
 use crate::common::larger;
-use crate::models::Pendulum;
+use crate::models::{PENDULUM, VanDerPol};
 use std::f64::consts::{PI, TAU};
 use tfe::AssemblyError;
 use tfe::boundary::BoundaryError;
@@ -33,16 +33,6 @@ struct Pushed {
     f: f64,
     w: f64,
     c: f64,
-}
-
-/// Van der Pol's oscillator with any mass.
-#[dynamics(
-    coordinates(x),
-    lagrangian = m*(dot(x)^2 - x^2)/2,
-    force(x) = m*(1 - x^2)*dot(x),
-)]
-struct VanDerPol {
-    m: f64,
 }
 
 /// A pendulum in a vehicle that is far away and moves on.
@@ -143,7 +133,7 @@ fn forced_orbits_have_the_same_multipliers() {
 /// An angle next to a distance is as accurate as alone, although it is small relative to the distance.
 #[test]
 fn small_coordinates_are_right_beside_large_ones() {
-    let pendulum = Pendulum {};
+    let pendulum = PENDULUM;
     let alone = BoundaryValue::of(&pendulum)
         .element(Mixed::<8>)
         .elements(20)
@@ -175,7 +165,7 @@ fn small_coordinates_are_right_beside_large_ones() {
 /// returned must be a motion.
 #[test]
 fn small_coordinates_that_are_not_found_are_no_solution() {
-    let (carried, pendulum) = (Carried { m: 1.0 }, Pendulum {});
+    let (carried, pendulum) = (Carried { m: 1.0 }, PENDULUM);
     for (time, angle) in [(7.0, PI), (7.0, 4.0), (10.0, 0.5), (10.0, 1.0)] {
         let far = BoundaryValue::of(&carried)
             .element(Mixed::<8>)
@@ -208,7 +198,7 @@ fn small_coordinates_that_are_not_found_are_no_solution() {
 #[test]
 fn a_force_that_closes_an_orbit_is_measured_by_the_mass() {
     for m in [1e-12, 1e-6, 1.0, 1e6, 1e12] {
-        let oscillator = VanDerPol { m };
+        let oscillator = VanDerPol { m, mu: 1.0 };
         let guess = |t: f64| ([2.0 * t.cos()], [-2.0 * t.sin()]);
         let of = || PeriodicOrbit::of(&oscillator).elements(40).guess(guess);
         let orbit = of().unknown_period(6.6).solve().expect("a limit cycle");
