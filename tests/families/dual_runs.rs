@@ -2,6 +2,7 @@
 
 use super::gradient::{Chain, chain};
 use crate::duals::{self, Beside, Phase, number};
+use crate::lengths::Seen;
 use tfe::family::{Gradient, Loss, Model as _};
 use tfe::prelude::*;
 use tfe::runtime::dual::Dual;
@@ -54,17 +55,13 @@ fn derivatives_of_a_hundred_sites_are_those_of_runs_in_dual_numbers() {
         .gradient(start.clone(), 0.0..length, &at_end)
         .expect("a gradient");
     let mut beside = Beside::new((&start.q, &start.p), &end);
-    let (mut off, mut size) = (0.0_f64, 0.0_f64);
-    let mut see = |found: f64, forwards: f64| {
-        assert!(found.is_finite() && forwards.is_finite());
-        (off, size) = (off.max((found - forwards).abs()), size.max(forwards.abs()));
-    };
+    let mut seen = Seen::NOTHING;
     // Every thirteenth mass and spring, and all parameters common to all sites; gradients are compared with all of
     // these.
     assert_eq!(s.parameters().len(), 2 * SITES - 1 + 4);
     for (index, name) in s.parameters().iter().enumerate() {
         let by = s.by(name).last();
-        see(gradient.by(name), loss(&by.q, &by.p));
+        seen.see(&[gradient.by(name)], &[loss(&by.q, &by.p)]);
         if index % 13 == 0 || index >= 2 * SITES - 1 {
             beside.by_parameter(index, &by.q, &by.p);
         }
@@ -77,12 +74,13 @@ fn derivatives_of_a_hundred_sites_are_those_of_runs_in_dual_numbers() {
             None => (&backwards.p, column),
             Some(a) => (&backwards.q, a),
         };
-        see(backwards[a], loss(&found[SITES..], &found[..SITES]));
+        let forwards = loss(&found[SITES..], &found[..SITES]);
+        seen.see(&[backwards[a]], &[forwards]);
         if column % 23 == 0 {
             beside.by_start(column, &found[SITES..], &found[..SITES]);
         }
     }
     // The rounding errors of eight steps of both.
     assert!(beside.off() < 1e-12, "{:.1e}", beside.off());
-    assert!(off < 1e-12 * size, "{off:.1e} of {size:.1e}");
+    assert!(seen.part() < 1e-12, "{:.1e} of {:.1e}", seen.off, seen.size);
 }

@@ -1,98 +1,40 @@
 //! Gradients of losses of models of run-time length by the adjoint (backward) method, compared with forward
 //! derivatives.
 
-use super::sensitive::{Five, Long, LongPendula};
+use super::sensitive::{LongPendula, pair, pendula};
+use crate::composed::{self, TIMES};
+use crate::lengths::{Seen, of_heap};
 use tfe::RunErrorKind;
 use tfe::family::{FamilyState, Loss, Model, RunError};
 use tfe::length::RunTimeLength;
 use tfe::prelude::*;
 
 /// The largest difference between a backward gradient and the one composed of forward derivatives, relative to the
-/// largest derivative. The loss contains coordinates, momenta, velocities and an output at the end, and an output at
-/// four times, one of which is the start.
+/// largest derivative.
 fn off<M: Model>(
     run: &Simulation<'_, M, 0, RunTimeLength>,
     start: &FamilyState,
     output: &str,
 ) -> f64 {
-    let times = [0.0, 0.31, 0.5, 1.0];
-    let values = [0.2, -0.1, 0.4, 0.3];
-    let loss = Loss::of_end(|q, p, v| {
-        let last = q.len() - 1;
-        q[0].sin() + 0.5 * p[last].powi(2) + q[last] * v[0] + v[1].powi(2)
-    })
-    .and(Loss::squares(output, times, values))
-    .and(Loss::output_at_end(output));
-    let (value, gradient) = run
-        .gradient(start.clone(), 0.0..1.0, &loss)
-        .expect("a gradient");
-    let forwards = times.iter().fold(run.clone(), |run, t| run.break_at(*t));
+    let gradient = |loss: &Loss<'_>| {
+        let found = run.gradient(start.clone(), 0.0..1.0, loss);
+        found.expect("a gradient")
+    };
+    let all = gradient(&composed::of_all(output));
+    let of_states = gradient(&composed::of_states(output));
+    let forwards = TIMES.iter().fold(run.clone(), |run, t| run.break_at(*t));
     let forwards = forwards.run_sensitive(start.clone(), 0.0..1.0);
     let s = forwards.expect("derivatives");
-    assert_eq!(gradient.motion().states(), s.motion().states());
-    let nodes = s.motion().states();
-    let at = times.map(|t| nodes.iter().position(|node| node.t == t).expect("a node"));
-    let outputs = s.motion().outputs().column(output).expect("declared");
-    let node = s.motion().last();
-    let last = node.q.len() - 1;
-    let squares: f64 = (at.iter().zip(values))
-        .map(|(at, m)| 0.5 * (outputs[*at] - m).powi(2))
-        .sum();
-    let direct = node.q[0].sin()
-        + 0.5 * node.p[last].powi(2)
-        + node.q[last] * node.v[0]
-        + node.v[1].powi(2)
-        + outputs[at[3]];
-    assert!((value - squares - direct).abs() < 1e-13 * value.abs().max(1.0));
-    let slope = |by: &tfe::family::Node, slopes: &dyn Fn(usize) -> f64| {
-        let squares: f64 = (at.iter().zip(values))
-            .map(|(at, m)| (outputs[*at] - m) * slopes(*at))
-            .sum();
-        squares
-            + node.q[0].cos() * by.q[0]
-            + node.p[last] * by.p[last]
-            + by.q[last] * node.v[0]
-            + node.q[last] * by.v[0]
-            + 2.0 * node.v[1] * by.v[1]
-            + slopes(at[3])
-    };
-    let (mut off, mut size) = (0.0_f64, 0.0_f64);
-    let mut see = |found: f64, expected: f64| {
-        assert!(found.is_finite() && expected.is_finite());
-        (off, size) = (off.max((found - expected).abs()), size.max(expected.abs()));
-    };
-    assert_eq!(gradient.parameters(), s.parameters());
-    for name in s.parameters() {
-        let slopes = s.by(name).output(output).expect("declared");
-        see(
-            gradient.by(name),
-            slope(&s.by(name).last(), &|at| slopes[at]),
-        );
+    assert_eq!(all.1.motion().states(), s.motion().states());
+    assert_eq!(all.1.parameters(), s.parameters());
+    let pairs = composed::pairs(&all, &of_states, &s, output);
+    let [value, expected] = pairs.value;
+    assert!((value - expected).abs() < 1e-13 * value.abs().max(1.0));
+    let mut seen = Seen::NOTHING;
+    for [found, expected] in pairs.by_parameters.iter().chain(&pairs.by_start) {
+        seen.see(&[*found], &[*expected]);
     }
-    // There are no forward derivatives of velocities by the initial state: use a loss without them.
-    let loss = Loss::of_end(|q, p, _| q[0].sin() + 0.5 * p[q.len() - 1].powi(2))
-        .and(Loss::squares(output, times, values));
-    let (_, gradient) = run
-        .gradient(start.clone(), 0.0..1.0, &loss)
-        .expect("a gradient");
-    let by_start = s.by_start().output(output).expect("declared");
-    let matrix = s.by_start().last();
-    let n = node.q.len();
-    for a in 0..n {
-        let found = [gradient.by_start().p[a], gradient.by_start().q[a]];
-        for (found, column) in found.into_iter().zip([a, n + a]) {
-            let of = |state: &FamilyState| if column < n { state.p[a] } else { state.q[a] };
-            let squares: f64 = (at.iter().zip(values))
-                .map(|(at, m)| (outputs[*at] - m) * of(&by_start[*at]))
-                .sum();
-            let (by_q, by_p) = (matrix[(n, column)], matrix[(n - 1, column)]);
-            see(
-                found,
-                squares + node.q[0].cos() * by_q + node.p[last] * by_p,
-            );
-        }
-    }
-    off / size
+    seen.part()
 }
 
 /// Springs each with its own stiffness as a parameter and friction: M q̈ = f with a constant diagonal M.
@@ -169,31 +111,16 @@ fn gradients_backwards_are_derivatives_forwards() {
     let off_stiff = off(&run, &start, "middle");
     assert!(off_stiff < 10.0 * ROUNDING, "{off_stiff:.1e}");
     // Masses that depend on coordinates, and products of velocities.
-    let long = Long {
-        n: 5,
-        m: vec![1.0, 1.5, 0.7, 2.0, 0.4],
-        a: 0.3,
-        s: vec![1.0, 2.0, 0.5, 3.0],
-        c: 0.2,
-    };
-    let start = long.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
+    let (long, _, start) = pair();
+    let start = of_heap(&start);
     for element in elements {
         let run = Simulation::new(&long).element(element).step(0.05);
         let off = off(&run, &start, "power");
         assert!(off < ROUNDING, "{element}: {off:.1e}");
     }
     // A Hamiltonian with momentum-dependent friction.
-    let pendula = LongPendula {
-        n: 3,
-        m: 0.7,
-        k: vec![1.3, 2.1],
-        b: 0.2,
-        c: 0.15,
-    };
-    let start = FamilyState {
-        q: vec![0.4, -0.3, 0.9],
-        p: vec![0.2, 0.5, -0.1],
-    };
+    let (pendula, _, start) = pendula();
+    let start = of_heap(&start);
     for element in [Element::mixed(4), Element::mixed(9), Element::radau(4)] {
         let run = Simulation::new(&pendula).element(element).step(0.05);
         let off = off(&run, &start, "energy");
@@ -351,25 +278,7 @@ fn runs_that_keep_some_nodes_have_the_gradients_of_those_that_keep_all() {
 /// Compared with the same model of fixed size, by a mass, springs and a friction.
 #[test]
 fn second_derivatives_are_those_of_fixed_size() {
-    let (m, s) = ([1.0, 1.5, 0.7, 2.0, 0.4], [1.0, 2.0, 0.5, 3.0]);
-    let five = Five {
-        m,
-        a: 0.3,
-        s,
-        c: 0.2,
-    };
-    let long = Long {
-        n: 5,
-        m: m.to_vec(),
-        a: 0.3,
-        s: s.to_vec(),
-        c: 0.2,
-    };
-    let start = five.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
-    let long_start = FamilyState {
-        q: start.q.to_vec(),
-        p: start.p.to_vec(),
-    };
+    let (long, five, start) = pair();
     let names = ["m[1]", "s[2]", "c"];
     let loss = tfe::sensitivity::Loss::output_at_end("power");
     let fixed = Simulation::new(&five).step(0.05);
@@ -377,7 +286,7 @@ fn second_derivatives_are_those_of_fixed_size() {
     let fixed = fixed.expect("second derivatives");
     let loss = Loss::output_at_end("power");
     let run = Simulation::new(&long).step(0.05);
-    let found = run.hessian(long_start, 0.0..1.0, &loss, names);
+    let found = run.hessian(of_heap(&start), 0.0..1.0, &loss, names);
     let found = found.expect("second derivatives");
     let off = (found.matrix() - fixed.matrix()).amax();
     assert!(off < 1e-9 * fixed.matrix().amax(), "{off:e}");

@@ -1,9 +1,10 @@
 //! Derivatives between the nodes and of integrals of outputs: compared with models of fixed size.
 
 use super::gradient::{Chain, chain};
-use super::sensitive::{Five, LongPendula, ThreePendula, pair};
-use tfe::family::{self, FamilyState};
-use tfe::length::RunTimeLength;
+use super::sensitive::{pair, pendula};
+use crate::lengths::{Seen, of_heap};
+use tfe::family;
+use tfe::length::{Length, RunTimeLength};
 use tfe::prelude::*;
 use tfe::sensitivity::Loss;
 use tfe::{AtError, Model};
@@ -33,55 +34,23 @@ fn off<M: family::Model, F: Model<N>, const N: usize>(
     start: State<N>,
     output: &str,
 ) -> f64 {
-    let (mut off, mut size) = (0.0_f64, 0.0_f64);
-    let mut see = |a: f64, b: f64| {
-        assert!(a.is_finite() && b.is_finite());
-        (off, size) = (off.max((a - b).abs()), size.max(b.abs()));
-    };
-    let long_start = || FamilyState {
-        q: start.q.to_vec(),
-        p: start.p.to_vec(),
-    };
+    let mut seen = Seen::NOTHING;
     let span = 0.0..1.0;
-    let ours = long.run_sensitive(long_start(), span.clone());
+    let ours = long.run_sensitive(of_heap(&start), span.clone());
     let theirs = fixed.run_sensitive(start, span.clone());
     let (ours, theirs) = (ours.expect("derivatives"), theirs.expect("derivatives"));
-    for t in [0.013, 0.26, 0.5, 0.777, 0.98] {
-        for name in theirs.parameters() {
-            let a = ours.by(name).at(t).expect("in the span");
-            let b = theirs.by(name).at(t).expect("in the span");
-            for k in 0..N {
-                see(a.q[k], b.q[k]);
-                see(a.p[k], b.p[k]);
-                see(a.v[k], b.v[k]);
-            }
-        }
-        let a = ours.by_start().at(t).expect("in the span");
-        let b = theirs.by_start().at(t).expect("in the span");
-        for (a, b) in a.iter().zip(b.iter()) {
-            see(*a, *b);
-        }
-    }
-    let loss = family::Loss::integral(output)
-        .times(0.7)
-        .and(family::Loss::output_at_end(output));
-    let (a, ours) = long
-        .gradient(long_start(), span.clone(), &loss)
-        .expect("a gradient");
-    let loss = Loss::integral(output)
-        .times(0.7)
-        .and(Loss::output_at_end(output));
-    let (b, theirs) = fixed.gradient(start, span, &loss).expect("a gradient");
-    see(a, b);
-    for (a, b) in ours.by_parameters().iter().zip(theirs.by_parameters()) {
-        see(*a, *b);
-    }
-    let (a, b) = (ours.by_start(), theirs.by_start());
-    for k in 0..N {
-        see(a.q[k], b.q[k]);
-        see(a.p[k], b.p[k]);
-    }
-    off / size
+    seen.see_inside(&ours, &theirs, &[0.013, 0.26, 0.5, 0.777, 0.98]);
+    let ours = long.gradient(of_heap(&start), span.clone(), &loss(output));
+    let theirs = fixed.gradient(start, span, &loss(output));
+    let (ours, theirs) = (ours.expect("a gradient"), theirs.expect("a gradient"));
+    seen.see_gradients(&ours, &theirs);
+    seen.part()
+}
+
+/// An integral and the value at the end.
+fn loss<'l, const N: usize, L: Length<N>>(output: &str) -> Loss<'l, N, L> {
+    let integral = Loss::integral(output).times(0.7);
+    integral.and(Loss::output_at_end(output))
 }
 
 #[test]
@@ -131,8 +100,7 @@ fn between_the_nodes_and_of_integrals() {
     let off_stiff = off(&ours, &theirs, start, "middle");
     assert!(off_stiff < 10.0 * ROUNDING, "{off_stiff:.1e}");
     // Masses that depend on coordinates, and products of velocities.
-    let (long, five): (_, Five) = pair();
-    let start = five.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
+    let (long, five, start) = pair();
     for element in elements {
         let ours = Simulation::new(&long).element(element).step(0.05);
         let theirs = Simulation::new(&five).element(element).step(0.05);
@@ -140,19 +108,7 @@ fn between_the_nodes_and_of_integrals() {
         assert!(off < ROUNDING, "{element}: {off:.1e}");
     }
     // A Hamiltonian with momentum-dependent friction.
-    let (m, k, b, c) = (0.7, [1.3, 2.1], 0.2, 0.15);
-    let long = LongPendula {
-        n: 3,
-        m,
-        k: k.to_vec(),
-        b,
-        c,
-    };
-    let three = ThreePendula { m, k, b, c };
-    let start = State {
-        q: [0.4, -0.3, 0.9],
-        p: [0.2, 0.5, -0.1],
-    };
+    let (long, three, start) = pendula();
     for element in [Element::mixed(4), Element::mixed(9), Element::radau(4)] {
         let ours = Simulation::new(&long).element(element).step(0.05);
         let theirs = Simulation::new(&three).element(element).step(0.05);
@@ -163,10 +119,10 @@ fn between_the_nodes_and_of_integrals() {
 
 #[test]
 fn derivatives_between_nodes_that_were_not_kept_are_told() {
-    let (long, _) = pair();
-    let start = long.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
+    let (long, _, start) = pair();
     let run = Simulation::new(&long).step(0.1).record_every(2);
-    let s = run.run_sensitive(start, 0.0..1.0).expect("derivatives");
+    let s = run.run_sensitive(of_heap(&start), 0.0..1.0);
+    let s = s.expect("derivatives");
     assert!(s.by("c").at(0.4).is_ok());
     let told = s.by("c").at(0.45).expect_err("not kept");
     assert!(matches!(told, AtError::NotRecorded { .. }), "{told}");

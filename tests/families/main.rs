@@ -3,8 +3,14 @@
 #[path = "../common/mod.rs"]
 mod common;
 #[cfg(feature = "sparse")]
+#[path = "../common/composed.rs"]
+mod composed;
+#[cfg(feature = "sparse")]
 #[path = "../common/duals.rs"]
 mod duals;
+#[cfg(feature = "sparse")]
+#[path = "../common/lengths.rs"]
+mod lengths;
 
 mod calls;
 mod checkpoints;

@@ -1,6 +1,7 @@
 //! Derivatives of motions of models of run-time length: compared with models of fixed size, and with differences of
 //! runs.
 
+use crate::lengths::{Seen, of_both_lengths, of_heap};
 use tfe::RunErrorKind;
 use tfe::family::RunError;
 use tfe::prelude::*;
@@ -73,77 +74,56 @@ fn compare<M: family::Model, F: Model<N>, const N: usize>(
     output: &str,
 ) -> f64 {
     let span = 0.0..1.5;
-    let long_start = family::FamilyState {
-        q: start.q.to_vec(),
-        p: start.p.to_vec(),
-    };
-    let ours = long_run
-        .run_sensitive(long_start, span.clone())
-        .expect("a good run");
+    let ours = long_run.run_sensitive(of_heap(&start), span.clone());
+    let ours = ours.expect("a good run");
     let theirs = fixed_run.run_sensitive(start, span).expect("a good run");
     assert_eq!(ours.parameters(), theirs.parameters());
     assert_eq!(ours.parameters().len(), long.parameters());
-    let (mut off, mut size) = (0.0_f64, 0.0_f64);
-    let mut see = |a: f64, b: f64| {
-        assert!(a.is_finite() && b.is_finite());
-        (off, size) = (off.max((a - b).abs()), size.max(b.abs()));
-    };
+    let mut seen = Seen::NOTHING;
     for name in theirs.parameters() {
         let (ours, theirs) = (ours.by(name), theirs.by(name));
         let (a, b) = (ours.states(), theirs.states());
         assert_eq!(a.len(), b.len());
         for (a, b) in a.iter().zip(&b) {
             assert_eq!(a.t, b.t);
-            for k in 0..N {
-                see(a.q[k], b.q[k]);
-                see(a.p[k], b.p[k]);
-                see(a.v[k], b.v[k]);
-            }
+            seen.see_nodes(a, b);
         }
-        let outputs =
-            [ours.output(output), theirs.output(output)].map(|one| one.expect("declared"));
-        for (a, b) in outputs[0].iter().zip(&outputs[1]) {
-            see(*a, *b);
-        }
+        let [a, b] = [ours.output(output), theirs.output(output)];
+        seen.see(&a.expect("declared"), &b.expect("declared"));
     }
     let (a, b) = (ours.by_start().matrices(), theirs.by_start().matrices());
     for (a, b) in a.iter().zip(&b) {
-        assert_eq!(a.shape(), b.shape());
-        for (a, b) in a.iter().zip(b.iter()) {
-            see(*a, *b);
-        }
+        seen.see(a.as_slice(), b.as_slice());
     }
-    let gradients = (
-        ours.by_start().output(output).expect("declared"),
-        theirs.by_start().output(output).expect("declared"),
-    );
-    for (a, b) in gradients.0.iter().zip(&gradients.1) {
-        for k in 0..N {
-            see(a.q[k], b.q[k]);
-            see(a.p[k], b.p[k]);
-        }
+    let a = ours.by_start().output(output).expect("declared");
+    let b = theirs.by_start().output(output).expect("declared");
+    for (a, b) in a.iter().zip(&b) {
+        seen.see(&a.q, &b.q);
+        seen.see(&a.p, &b.p);
     }
-    off / size
+    seen.part()
 }
 
-/// The same model with both kinds of length.
-pub(super) fn pair() -> (Long, Five) {
+/// The same model with both kinds of length, and a start.
+pub(super) fn pair() -> (Long, Five, State<5>) {
     let (m, s) = ([1.0, 1.5, 0.7, 2.0, 0.4], [1.0, 2.0, 0.5, 3.0]);
     let (a, c) = (0.3, 0.2);
-    let long = Long {
-        n: 5,
-        m: m.to_vec(),
-        a,
-        s: s.to_vec(),
-        c,
-    };
-    (long, Five { m, a, s, c })
+    let (long, five) = of_both_lengths!(Long(5), Five: m, a, s, c);
+    let start = five.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
+    (long, five, start)
+}
+
+/// The same by a Hamiltonian.
+pub(super) fn pendula() -> (LongPendula, ThreePendula, State<3>) {
+    let (m, k, b, c) = (0.7, [1.3, 2.1], 0.2, 0.15);
+    let (long, three) = of_both_lengths!(LongPendula(3), ThreePendula: m, k, b, c);
+    let (q, p) = ([0.4, -0.3, 0.9], [0.2, 0.5, -0.1]);
+    (long, three, State { q, p })
 }
 
 #[test]
 fn derivatives_are_those_of_models_of_fixed_size() {
-    let (long, five) = pair();
-    let start = five.state([0.3, -0.2, 0.8, 0.1, -0.6], [0.1, 0.5, -0.4, 0.2, 0.9]);
+    let (long, five, start) = pair();
     for element in [
         Element::mixed(4),
         Element::mixed(3),
@@ -165,19 +145,7 @@ fn derivatives_are_those_of_models_of_fixed_size() {
         // The rounding errors of fifteen steps and of both solutions.
         assert!(off < 1e-12, "{element}: {off:.1e}");
     }
-    let (m, k, b, c) = (0.7, [1.3, 2.1], 0.2, 0.15);
-    let long = LongPendula {
-        n: 3,
-        m,
-        k: k.to_vec(),
-        b,
-        c,
-    };
-    let three = ThreePendula { m, k, b, c };
-    let start = State {
-        q: [0.4, -0.3, 0.9],
-        p: [0.2, 0.5, -0.1],
-    };
+    let (long, three, start) = pendula();
     for element in [Element::mixed(4), Element::radau(4)] {
         let ours = Simulation::new(&long).element(element).step(0.1);
         let theirs = Simulation::new(&three).element(element).step(0.1);
@@ -275,12 +243,8 @@ fn what_has_no_derivatives_is_told() {
     assert!(with.get("k").is_none() && with.parameters().is_empty());
 
     // Steps so long that the run has cut them.
-    let (long, five) = pair();
-    let start = five.state([2.0, -1.0, 0.8, 1.5, -0.6], [3.0, 0.5, -4.0, 2.0, 0.9]);
-    let start = family::FamilyState {
-        q: start.q.to_vec(),
-        p: start.p.to_vec(),
-    };
+    let (long, ..) = pair();
+    let start = long.state([2.0, -1.0, 0.8, 1.5, -0.6], [3.0, 0.5, -4.0, 2.0, 0.9]);
     let run = Simulation::new(&long).step(0.7);
     let cuts = run
         .run(start.clone(), 0.0..2.1)

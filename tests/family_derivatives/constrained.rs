@@ -1,10 +1,10 @@
 //! Derivatives of constrained models of run-time length: compared with models of fixed size, column by column.
 
+use crate::common::larger;
 use crate::differences::difference;
-use crate::largest::larger;
-use crate::lengths::{of_both_lengths, of_heap};
+use crate::lengths::{Seen, of_both_lengths, of_heap};
 use nalgebra::Complex;
-use tfe::length::RunTimeLength;
+use tfe::length::{Length, RunTimeLength};
 use tfe::periodic_schur::Multiplier;
 use tfe::prelude::*;
 use tfe::sensitivity::Loss;
@@ -89,31 +89,6 @@ pub(super) fn start(fixed: &ThreeRods) -> State<6> {
     )
 }
 
-/// The largest difference and the largest number.
-struct Seen {
-    off: f64,
-    size: f64,
-}
-
-impl Seen {
-    const NOTHING: Self = Self {
-        off: 0.0,
-        size: 0.0,
-    };
-
-    fn see(&mut self, ours: &[f64], theirs: &[f64]) {
-        assert_eq!(ours.len(), theirs.len());
-        for (a, b) in ours.iter().zip(theirs) {
-            self.off = larger(self.off, (a - b).abs());
-            self.size = larger(self.size, b.abs());
-        }
-    }
-
-    fn part(&self) -> f64 {
-        self.off / self.size
-    }
-}
-
 const ELEMENTS: [Element; 3] = [Element::mixed(2), Element::mixed(4), Element::mixed(6)];
 
 #[test]
@@ -137,6 +112,13 @@ fn transition_matrices_are_those_of_fixed_size() {
             assert!(off < 1e-14 / h.abs(), "{element}, {h}: {off:e}");
         }
     }
+}
+
+/// A loss with momenta, velocities and an output at the end, and an integral.
+fn loss<'l, const N: usize, L: Length<N>>(integral: f64) -> Loss<'l, N, L> {
+    Loss::of_end(|q, p, v| q[1] * v[0] + p[q.len() - 1] * v[2])
+        .and(Loss::output_at_end("height"))
+        .and(Loss::integral("height").times(integral))
 }
 
 /// Derivatives along a run, at nodes and between them, by the initial state and all parameters; gradients of a loss
@@ -172,34 +154,13 @@ fn off_at<M: family::Model, F: Model<N>, const N: usize>(
     let ours = long.run_sensitive(of_heap(start), span.clone());
     let ours = ours.expect("a run");
     let mut sensitive = Seen::NOTHING;
-    assert_eq!(ours.parameters(), theirs.parameters());
-    for t in times.iter().copied() {
-        for name in theirs.parameters() {
-            let a = ours.by(name).at(t).expect("in the span");
-            let b = theirs.by(name).at(t).expect("in the span");
-            sensitive.see(&a.q, &b.q);
-            sensitive.see(&a.p, &b.p);
-            sensitive.see(&a.v, &b.v);
-        }
-        let a = ours.by_start().at(t).expect("in the span");
-        let b = theirs.by_start().at(t).expect("in the span");
-        sensitive.see(a.as_slice(), b.as_slice());
-    }
+    sensitive.see_inside(&ours, &theirs, times);
 
     let mut gradient = Seen::NOTHING;
-    // With momenta, velocities and an output at the end, and an integral.
-    let end = |q: &[f64], p: &[f64], v: &[f64]| q[1] * v[0] + p[N - 1] * v[2];
-    let loss = Loss::of_end(end).and(Loss::output_at_end("height"));
-    let loss = loss.and(Loss::integral("height").times(integral));
-    let (theirs, by) = fixed.gradient(*start, span.clone(), &loss).expect("one");
-    let loss = Loss::of_end(end).and(Loss::output_at_end("height"));
-    let loss = loss.and(Loss::integral("height").times(integral));
-    let ours = long.gradient(of_heap(start), span.clone(), &loss);
-    let (ours, our) = ours.expect("a gradient");
-    gradient.see(&[ours], &[theirs]);
-    gradient.see(our.by_parameters(), by.by_parameters());
-    gradient.see(&our.by_start().q, &by.by_start().q);
-    gradient.see(&our.by_start().p, &by.by_start().p);
+    let (theirs, ours) = (loss(integral), loss(integral));
+    let theirs = fixed.gradient(*start, span.clone(), &theirs).expect("one");
+    let ours = long.gradient(of_heap(start), span.clone(), &ours);
+    gradient.see_gradients(&ours.expect("a gradient"), &theirs);
     [linearised.part(), sensitive.part(), gradient.part()]
 }
 

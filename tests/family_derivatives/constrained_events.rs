@@ -3,9 +3,9 @@
 
 use crate::constrained::{Rods, ThreeRods, rods, start};
 use crate::differences::difference_over;
-use crate::events::check_same;
+use crate::events::{SAME, apart, check_matrices, check_same};
 use crate::gradients;
-use crate::lengths::{SAME, apart, check_matrices, of_heap};
+use crate::lengths::of_heap;
 use nalgebra::DMatrix;
 use tfe::Occurrence;
 use tfe::family::{self, Model};

@@ -1,15 +1,15 @@
 //! Derivatives across events that change the state or end the run: compared with those of the same model of fixed size,
 //! and with differences of runs.
 
+use crate::common::larger;
 use crate::differences::difference_over;
-use crate::largest::larger;
-use crate::lengths::{SAME, apart, bounce, check_matrices, of_both_lengths, of_heap};
+use crate::lengths::{of_both_lengths, of_heap};
 use tfe::error::RunErrorKind;
 use tfe::family::FamilyState;
 use tfe::length::{Length, RunTimeLength};
 use tfe::prelude::*;
 use tfe::sensitivity::Sensitive;
-use tfe::{Occurrence, family};
+use tfe::{Linearised, Occurrence, family};
 
 /// Balls coupled by springs above a ground that moves up and down, in a wind that changes with time.
 #[dynamics(
@@ -218,6 +218,46 @@ pub(super) fn moved(start: &FamilyState, column: usize, x: f64) -> FamilyState {
         Some(a) => moved.q[a] = x,
     }
     moved
+}
+
+/// An impact that leaves 0.8 of the speed.
+pub(super) fn bounce<const N: usize, L: Length<N>>(event: &Occurrence<'_, N, L>) -> Act<N, L> {
+    Act::Restart(event.after_impact(0.8))
+}
+
+/// The largest difference of two lists of numbers, relative to the largest of these numbers, but at least to 1.
+pub(super) fn apart<'a>(
+    a: impl IntoIterator<Item = &'a f64>,
+    b: impl IntoIterator<Item = &'a f64>,
+) -> f64 {
+    let (a, b): (Vec<f64>, Vec<f64>) = (
+        a.into_iter().copied().collect(),
+        b.into_iter().copied().collect(),
+    );
+    assert_eq!(a.len(), b.len());
+    let size = a
+        .iter()
+        .chain(&b)
+        .fold(1.0, |size, one| larger(size, one.abs()));
+    let pairs = a.iter().zip(&b);
+    pairs.fold(0.0, |most, (a, b)| larger(most, (a - b).abs() / size))
+}
+
+/// Both are derivatives of the same computed motion. Actions are differentiated by differences over 2e-3, with a
+/// rounding error of some 1e-13 / 2e-3, which each bounce multiplies several times.
+pub(super) const SAME: f64 = 1e-9;
+
+/// Compares the matrices of all elements.
+#[track_caller]
+pub(super) fn check_matrices<const N: usize>(
+    long: &Linearised<0, RunTimeLength>,
+    fixed: &Linearised<N>,
+) {
+    assert_eq!(long.transitions().len(), fixed.transitions().len());
+    for (a, b) in long.transitions().iter().zip(fixed.transitions()) {
+        let off = apart(a, b);
+        assert!(off < SAME, "{off:e}");
+    }
 }
 
 #[track_caller]

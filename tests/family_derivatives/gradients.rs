@@ -3,9 +3,10 @@
 
 use crate::differences::difference_over;
 use crate::events::{
-    G, THREE, V, Y, balls, bouncing, by_momenta, ending, kicked, long, moved, throw, turning,
+    G, SAME, THREE, V, Y, apart, balls, bouncing, by_momenta, ending, kicked, long, moved, throw,
+    turning,
 };
-use crate::lengths::{SAME, apart, of_heap};
+use crate::lengths::of_heap;
 use tfe::error::RunErrorKind;
 use tfe::length::{Length, RunTimeLength};
 use tfe::prelude::*;

@@ -1,6 +1,7 @@
 //! Periodic orbits with events of models of run-time length: compared with those of the same model of fixed size.
 
-use crate::lengths::{apart, bounce, of_both_lengths, of_heap};
+use crate::events::{apart, bounce};
+use crate::lengths::{of_both_lengths, of_heap};
 use std::f64::consts::TAU;
 use tfe::family::FamilyState;
 use tfe::length::{Length, RunTimeLength};

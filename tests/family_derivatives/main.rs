@@ -1,16 +1,17 @@
 //! Derivatives of steps of models of run-time length: transition operators, their spectra, periodic orbits.
 #![cfg(feature = "sparse")]
 
+#[path = "../common/mod.rs"]
+mod common;
 #[path = "../common/differences.rs"]
 mod differences;
-#[path = "../common/largest.rs"]
-mod largest;
+#[path = "../common/lengths.rs"]
+mod lengths;
 
 mod constrained;
 mod constrained_events;
 mod events;
 mod gradients;
 mod hybrid;
-mod lengths;
 mod orbits;
 mod transitions;

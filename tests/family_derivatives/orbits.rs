@@ -1,7 +1,7 @@
 //! Periodic orbits of models of run-time length.
 
+use crate::common::larger;
 use crate::differences::difference;
-use crate::largest::larger;
 use crate::lengths::of_both_lengths;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};

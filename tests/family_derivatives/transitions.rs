@@ -1,8 +1,8 @@
 //! The transition operator of a model of run-time length: the derivative of a step.
 
+use crate::common::larger;
 use crate::differences;
 use crate::hybrid::OnCircles;
-use crate::largest::larger;
 use crate::lengths::of_both_lengths;
 use tfe::family::{self, FamilyState};
 use tfe::length::RunTimeLength;

@@ -1,6 +1,7 @@
 //! Gradients of losses by the adjoint (backward) method.
 
 use super::*;
+use crate::composed::{self, TIMES};
 
 /// The backward gradient of a loss equals the one composed of forward derivatives.
 #[track_caller]
@@ -9,71 +10,29 @@ fn check_gradient<M: Model<N> + Sync, const N: usize>(
     start: State<N>,
     output: &str,
 ) {
-    let times = [0.0, 0.31, 0.5, 1.0];
-    let values = [0.2, -0.1, 0.4, 0.3];
-    let loss = Loss::at_end(|node: &Node<N>| {
-        node.q[0].sin() + 0.5 * node.p[N - 1].powi(2) + node.q[N - 1] * node.v[0]
-    })
-    .and(Loss::squares(output, times, values))
-    .and(Loss::output_at_end(output));
-    let (value, gradient) = simulation
-        .gradient(start, 0.0..1.0, &loss)
-        .expect("a gradient");
-    let run = times
+    let gradient = |loss: &Loss<'_, N>| {
+        let found = simulation.gradient(start, 0.0..1.0, loss);
+        found.expect("a gradient")
+    };
+    let all = gradient(&composed::of_all(output));
+    let of_states = gradient(&composed::of_states(output));
+    let forwards = TIMES
         .iter()
         .fold(simulation.clone(), |run, t| run.break_at(*t));
-    let s = run.run_sensitive(start, 0.0..1.0).expect("derivatives");
-    let last = s.motion().last();
-    let nodes = s.motion().states();
-    let at = times.map(|t| nodes.iter().position(|node| node.t == t).expect("a node"));
-    let outputs = s.motion().outputs().column(output).expect("declared");
-    let squares = at
-        .iter()
-        .zip(values)
-        .map(|(at, m)| 0.5 * (outputs[*at] - m).powi(2));
-    let (q, p, v) = (last.q, last.p, last.v);
-    let direct = q[0].sin() + 0.5 * p[N - 1].powi(2) + q[N - 1] * v[0] + outputs[at[3]];
-    assert!((value - squares.sum::<f64>() - direct).abs() < 1e-13 * value.abs().max(1.0));
-    let size = gradient
-        .by_parameters()
-        .iter()
-        .fold(1.0_f64, |m, x| m.max(x.abs()));
-    for name in s.parameters() {
-        let by = s.by(name).last();
-        let slopes = s.by(name).output(output).expect("declared");
-        let squares = at
-            .iter()
-            .zip(values)
-            .map(|(at, m)| (outputs[*at] - m) * slopes[*at]);
-        let expected = squares.sum::<f64>()
-            + q[0].cos() * by.q[0]
-            + p[N - 1] * by.p[N - 1]
-            + by.q[N - 1] * v[0]
-            + q[N - 1] * by.v[0]
-            + slopes[at[3]];
-        let found = gradient.by(name);
+    let s = forwards.run_sensitive(start, 0.0..1.0);
+    let s = s.expect("derivatives");
+    let pairs = composed::pairs(&all, &of_states, &s, output);
+    let [value, expected] = pairs.value;
+    assert!((value - expected).abs() < 1e-13 * value.abs().max(1.0));
+    let size = all.1.by_parameters().iter();
+    let size = size.fold(1.0_f64, |m, x| m.max(x.abs()));
+    for (name, [found, expected]) in s.parameters().iter().zip(&pairs.by_parameters) {
         assert!(
             (found - expected).abs() < 1e-12 * size,
             "{name}: {found} {expected}"
         );
     }
-    let by_start = s.by_start().output(output).expect("declared");
-    let matrix = s.by_start().last();
-    for a in 0..N {
-        // The velocity at the end would need differences of runs: use a loss without it.
-        let loss = Loss::squares(output, times, values).and(Loss::at_end(|node: &Node<N>| {
-            node.q[0].sin() + 0.5 * node.p[N - 1].powi(2)
-        }));
-        let (_, gradient) = simulation
-            .gradient(start, 0.0..1.0, &loss)
-            .expect("a gradient");
-        let squares = at.iter().zip(values);
-        let squares: f64 = squares
-            .map(|(at, m)| (outputs[*at] - m) * by_start[*at].q[a])
-            .sum();
-        let expected =
-            squares + q[0].cos() * matrix.q_by_q()[(0, a)] + p[N - 1] * matrix.p_by_q()[(N - 1, a)];
-        let found = gradient.by_start().q[a];
+    for (a, [found, expected]) in pairs.by_start[N..].iter().enumerate() {
         assert!(
             (found - expected).abs() < 1e-12 * size.max(expected.abs()),
             "{a}: {found} {expected}"

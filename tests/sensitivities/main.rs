@@ -1,5 +1,7 @@
 //! Derivatives of motions by parameters and initial states, compared with differences of runs.
 
+#[path = "../common/composed.rs"]
+mod composed;
 #[path = "../common/differences.rs"]
 mod differences;
 #[path = "../common/duals.rs"]
