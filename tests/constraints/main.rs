@@ -12,6 +12,7 @@ mod linkages;
 mod long_runs;
 mod mechanisms;
 mod models;
+mod moves;
 mod nonholonomic;
 mod orders;
 mod overconstrained;

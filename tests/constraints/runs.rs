@@ -1,6 +1,7 @@
 //! Helpers: runs that must not fail, and their errors.
 
 use crate::common::{distance, larger};
+use tfe::RunError;
 use tfe::prelude::*;
 
 /// The motion from `start` over `0..time`.
@@ -13,11 +14,17 @@ pub fn run<M: Model<N>, const N: usize>(
     time: f64,
 ) -> Motion<N> {
     let element = element.into();
-    Simulation::new(model)
-        .element(element)
-        .step(step)
-        .run(start, 0.0..time)
-        .unwrap_or_else(|error| panic!("{element}, h = {step}: {error}"))
+    let run = Simulation::new(model).element(element).step(step);
+    made(run.run(start, 0.0..time), (element, step))
+}
+
+/// The motion of a run that must not fail.
+#[track_caller]
+fn made<const N: usize>(
+    run: Result<Motion<N>, RunError<N>>,
+    (element, step): (Element, f64),
+) -> Motion<N> {
+    run.unwrap_or_else(|error| panic!("{element}, h = {step}: {error}"))
 }
 
 /// The velocities at the last node.

@@ -6,13 +6,13 @@ use crate::models::{
     Andrews, Bead, BeadRates, KnifeEdge, MovingGround, MovingWire, ON_WIRE, QuaternionTop,
     RodPendulum, RodPendulumRates,
 };
+use crate::moves::{Moves, Scene, Shown, show};
 use crate::overconstrained::plate;
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::ops::RangeInclusive;
 use tfe::prelude::*;
 use tfe::runtime::Statistics;
 use tfe::runtime::constrained::Trail;
-use tfe::runtime::step::{Control, Stepper};
 
 #[dynamics(
     coordinates(x, y),
@@ -42,16 +42,10 @@ const STEPS: [f64; 9] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
 /// Runs with three to eight nodes. Formerly eight nodes failed below steps of 1e-5, or took more than a hundred
 /// iterations per step.
-fn runs<M, const N: usize>(model: &M, start: State<N>)
-where
-    M: tfe::runtime::Model<N>
-        + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
-{
+fn runs<const N: usize>(mechanism: &dyn Moves<N>) {
     for nodes in 3..=8 {
         for step in STEPS {
-            let simulation: Simulation<'_, M, N> = Simulation::new(model);
-            let run = simulation.element(Element::mixed(nodes)).step(step);
-            let motion = run.run(start, 0.0..40.0 * step);
+            let motion = mechanism.run(Element::mixed(nodes), step, 40.0 * step);
             let motion = motion.unwrap_or_else(|error| panic!("{nodes} {step:e}: {error}"));
             let iterations = motion.statistics().newton_iterations;
             assert!(iterations <= 16 * 40, "{nodes} {step:e}: {iterations}");
@@ -74,7 +68,8 @@ fn a_rod_takes_steps_of_any_size() {
         g: 9.81,
         l: 1.0,
     };
-    runs(&rod, rod.state([0.6, -0.8], [0.4, 0.3]));
+    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
+    runs(Scene { model: &rod, start }.moves());
 }
 
 fn slider_crank() -> (SliderCrank, State<3>) {
@@ -95,24 +90,19 @@ fn slider_crank() -> (SliderCrank, State<3>) {
 #[test]
 fn a_slider_crank_takes_steps_of_any_size() {
     let (crank, start) = slider_crank();
-    runs(&crank, start);
+    let model = &crank;
+    runs(Scene { model, start }.moves());
 }
 
 /// Elements of three to seven nodes compared with eight: errors fall with the order 2(n − 1) of the element until they
 /// reach rounding, and then remain there.
-fn falls<M, const N: usize>(name: &str, model: &M, start: State<N>, largest: f64)
-where
-    M: tfe::runtime::Model<N>
-        + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
-{
+fn falls<const N: usize>(name: &str, mechanism: &dyn Moves<N>, largest: f64) {
     const COUNT: u32 = 20;
     const ROUNDINGS: f64 = 4e-15;
     let mut before = [f64::INFINITY; 5];
     for step in STEPS.into_iter().skip_while(|step| *step > largest) {
         let end = |nodes: usize| {
-            let simulation: Simulation<'_, M, N> = Simulation::new(model);
-            let run = simulation.element(Element::mixed(nodes)).step(step);
-            let motion = run.run(start, 0.0..f64::from(COUNT) * step);
+            let motion = mechanism.run(Element::mixed(nodes), step, f64::from(COUNT) * step);
             let motion = motion.unwrap_or_else(|error| panic!("{name}, {nodes} {step:e}: {error}"));
             let iterations = motion.statistics().newton_iterations;
             assert!(
@@ -136,57 +126,59 @@ where
     }
 }
 
-/// What is tested for each of the mechanisms, with a span in which it moves.
-trait Shown {
-    fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
-    where
-        M: tfe::runtime::Model<N>
-            + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>;
-}
+/// Andrews' mechanism, which turns a thousand times per second.
+const SQUEEZER: &str = "Andrews";
 
+/// Twelve mechanisms.
 fn each(shown: &impl Shown) {
     let rod = RodPendulum::UNIT;
-    shown.of("rod", &rod, rod.horizontal(), 3.0);
+    show(shown, "rod", (&rod, rod.horizontal()), 3.0);
     let rates = RodPendulumRates::UNIT;
-    shown.of("rod by rates", &rates, rates.horizontal(), 3.0);
+    show(shown, "rod by rates", (&rates, rates.horizontal()), 3.0);
     let bead = Bead { g: 9.81 };
-    shown.of("bead", &bead, bead.state(ON_WIRE, [0.0; 2]), 3.0);
+    show(shown, "bead", (&bead, bead.state(ON_WIRE, [0.0; 2])), 3.0);
     let bead = BeadRates { g: 9.81 };
-    shown.of("bead by rates", &bead, bead.state(ON_WIRE, [0.0; 2]), 3.0);
+    show(
+        shown,
+        "bead by rates",
+        (&bead, bead.state(ON_WIRE, [0.0; 2])),
+        3.0,
+    );
     let wire = MovingWire { g: 9.81, c: 0.3 };
     let v = [0.1, 0.1 * 1.2_f64.powi(3) + 1.2_f64.powi(4) / 20.0];
-    shown.of("moving wire", &wire, wire.state(ON_WIRE, v), 3.0);
+    show(shown, "moving wire", (&wire, wire.state(ON_WIRE, v)), 3.0);
     let top = QuaternionTop::TABLE;
-    shown.of("top", &top, top.tilted(), 1.0);
+    show(shown, "top", (&top, top.tilted()), 1.0);
     let blade = KnifeEdge::TABLE;
-    shown.of("blade", &blade, blade.turning(1.0), 3.0);
+    show(shown, "blade", (&blade, blade.turning(1.0)), 3.0);
     let ground = MovingGround { c: 0.1 };
     let start = ground.state([0.0; 3], [1.0, 0.0, 0.5]);
-    shown.of("ground", &ground, start, 3.0);
+    show(shown, "ground", (&ground, start), 3.0);
     let (plate, start) = plate();
-    shown.of("plate", &plate, start, 3.0);
-    shown.of("Andrews", &Andrews, Andrews.at_rest(), 0.01);
+    show(shown, "plate", (&plate, start), 3.0);
+    show(shown, SQUEEZER, (&Andrews, Andrews.at_rest()), 0.01);
     let (crank, start) = slider_crank();
-    shown.of("slider-crank", &crank, start, 3.0);
+    show(shown, "slider-crank", (&crank, start), 3.0);
     let rod = Rod {
         m: 1.0,
         g: 9.81,
         l: 1.0,
     };
-    shown.of("fast rod", &rod, rod.state([0.6, -0.8], [4.0, 3.0]), 3.0);
+    show(
+        shown,
+        "fast rod",
+        (&rod, rod.state([0.6, -0.8], [4.0, 3.0])),
+        3.0,
+    );
 }
 
 #[test]
 fn errors_fall_until_they_are_roundings() {
     struct Falls;
     impl Shown for Falls {
-        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, _: f64)
-        where
-            M: tfe::runtime::Model<N>
-                + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
-        {
-            let largest = if name == "Andrews" { 1e-4 } else { 0.1 };
-            falls(name, model, start, largest);
+        fn of<const N: usize>(&self, name: &str, mechanism: &dyn Moves<N>, _: f64) {
+            let largest = if name == SQUEEZER { 1e-4 } else { 0.1 };
+            falls(name, mechanism, largest);
         }
     }
     each(&Falls);
@@ -202,28 +194,27 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
     const NEAR: f64 = 0.2;
     /// Relative to the step size.
     const SHORTEST_PIECE: f64 = 1.0 / 1024.0;
+    #[derive(Default)]
+    struct Counts {
+        runs: u32,
+        cut: u32,
+        warned: u32,
+        refused: u32,
+    }
     struct Long {
         nodes: RangeInclusive<usize>,
-        runs: Cell<u32>,
-        cut: Cell<u32>,
-        warned: Cell<u32>,
-        refused: Cell<u32>,
+        counts: RefCell<Counts>,
     }
     impl Shown for Long {
-        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
-        where
-            M: tfe::runtime::Model<N>
-                + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
-        {
-            let simulation: Simulation<'_, M, N> = Simulation::new(model);
-            let is_fast = name == "Andrews";
+        fn of<const N: usize>(&self, name: &str, mechanism: &dyn Moves<N>, span: f64) {
+            let is_fast = name == SQUEEZER;
             let (count, known, short) = if is_fast {
                 (1, 0.4, 1e-4)
             } else {
                 (COUNT, f64::from(COUNT), span / 300.0)
             };
-            let fine = simulation.clone().element(Mixed::<5>).step(short);
-            let exact = fine.run(start, 0.0..known).expect("a run");
+            let exact = mechanism.run(Element::mixed(5), short, known);
+            let exact = exact.expect("a run");
             // The largest rotation within a time, as far as the motion is known.
             let turns = |within: f64, step: f64| {
                 let nodes = exact.states().iter().filter(|node| node.t <= step);
@@ -231,18 +222,18 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
                 let speeds = pairs.map(|(from, to)| distance(&from.q, &to.q) / (to.t - from.t));
                 within * speeds.fold(0.0, larger)
             };
+            let mut counts = self.counts.borrow_mut();
             let steps = [1.0, 0.7, 0.5, 0.3, 0.2, 0.1].into_iter();
             // Steps of the squeezer are cut into a thousand pieces each: use only two of them, with two elements.
             for step in steps.filter(|step| !is_fast || [1.0, 0.1].contains(step)) {
                 let nodes = self.nodes.clone();
                 for nodes in nodes.step_by(if is_fast { 2 } else { 1 }) {
-                    let count_one = |cell: &Cell<u32>| cell.set(cell.get() + 1);
-                    count_one(&self.runs);
-                    let run = simulation.clone().element(Element::mixed(nodes)).step(step);
-                    let motion = match run.run(start, 0.0..f64::from(count) * step) {
+                    counts.runs += 1;
+                    let run = mechanism.run(Element::mixed(nodes), step, f64::from(count) * step);
+                    let motion = match run {
                         Ok(motion) => motion,
                         Err(error) => {
-                            count_one(&self.refused);
+                            counts.refused += 1;
                             let turned = turns(SHORTEST_PIECE * step, step);
                             assert!(
                                 turned > 0.5,
@@ -265,30 +256,25 @@ fn long_steps_run_or_are_too_long(nodes: RangeInclusive<usize>) {
                         off < NEAR || is_warned,
                         "{name}, {nodes} {step}: off by {off:.1e} without a word, cut: {is_cut}"
                     );
-                    if is_cut {
-                        count_one(&self.cut);
-                    }
-                    if is_warned {
-                        count_one(&self.warned);
-                    }
+                    counts.cut += u32::from(is_cut);
+                    counts.warned += u32::from(is_warned);
                 }
             }
         }
     }
     let all = Long {
         nodes,
-        runs: Cell::new(0),
-        cut: Cell::new(0),
-        warned: Cell::new(0),
-        refused: Cell::new(0),
+        counts: RefCell::default(),
     };
     each(&all);
+    let Counts {
+        runs,
+        cut,
+        warned,
+        refused,
+    } = all.counts.into_inner();
     println!(
-        "{} runs, {} with steps that were cut, {} with a warning, {} errors",
-        all.runs.get(),
-        all.cut.get(),
-        all.warned.get(),
-        all.refused.get()
+        "{runs} runs, {cut} with steps that were cut, {warned} with a warning, {refused} errors"
     );
 }
 
@@ -325,31 +311,9 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
         good: Cell<u32>,
     }
     impl Shown for Work {
-        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
-        where
-            M: tfe::runtime::Model<N>
-                + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
-        {
-            let simulation: Simulation<'_, M, N> = Simulation::new(model);
-            let fine = simulation.clone().element(Mixed::<8>).step(span / 400.0);
-            let exact = fine.run(start, 0.0..span).expect("a run");
-            // The error at all nodes, relative to the largest coordinate or momentum.
-            let off = |motion: &Motion<N>| {
-                let largest = |part: fn(&tfe::Node<N>) -> [f64; N]| {
-                    let size = |numbers: [f64; N]| {
-                        numbers
-                            .iter()
-                            .fold(0.0, |size: f64, x| larger(size, x.abs()))
-                    };
-                    let nodes = motion.states().iter();
-                    let off = nodes.clone().map(|node| {
-                        let there = exact.at(node.t).expect("in the span");
-                        distance(&part(node), &part(&there))
-                    });
-                    off.fold(0.0, larger) / nodes.map(|node| size(part(node))).fold(0.0, larger)
-                };
-                larger(largest(|node| node.q), largest(|node| node.p))
-            };
+        fn of<const N: usize>(&self, name: &str, mechanism: &dyn Moves<N>, span: f64) {
+            let exact = mechanism.run(Element::mixed(8), span / 400.0, span);
+            let exact = exact.expect("a run");
             let work = |statistics: &Statistics| {
                 statistics.residual_evaluations + statistics.tangent_evaluations
             };
@@ -357,9 +321,10 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
             let mut worst = 0.0;
             for accuracy in [1e-3, 1e-6, 1e-9] {
                 let what = format!("{name:14} {accuracy:e}");
-                let motion = simulation.clone().accuracy(accuracy).run(start, 0.0..span);
+                let motion = mechanism.run_accurately(accuracy, span);
                 let motion = motion.unwrap_or_else(|error| panic!("{what}: {error}"));
-                let (error, estimate) = (off(motion.motion()), motion.error_estimate());
+                let error = largest_error(motion.motion(), &exact);
+                let estimate = motion.error_estimate();
                 assert!(
                     error < accuracy && estimate <= accuracy,
                     "{what}: {error:e}, {estimate:e}"
@@ -373,28 +338,12 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
                 self.sharp
                     .set((sharp + u32::from(estimate < 2.0 * error), all + 1));
                 let picked = motion.picked().expect("picked");
-                let by_hand = simulation.clone().element(picked.element);
-                let by_hand = by_hand.tolerance(1e-3 * accuracy);
                 let made = |count: u64| {
-                    let run = by_hand.clone().step(span / count as f64);
-                    let motion = run.run(start, 0.0..span);
-                    motion.ok().filter(|motion| off(motion) < accuracy)
+                    let how = (picked.element, span / count as f64);
+                    let motion = mechanism.run_within(1e-3 * accuracy, how, span).ok()?;
+                    (largest_error(&motion, &exact) < accuracy).then(|| work(motion.statistics()))
                 };
-                // Three successive numbers of steps must meet it: not only by chance.
-                let meets = |count: u64| (count..count + 3).all(|count| made(count).is_some());
-                let (mut too_few, mut enough) = (0, 1);
-                while !meets(enough) {
-                    (too_few, enough) = (enough, 2 * enough);
-                }
-                while enough - too_few > 1 {
-                    let middle = u64::midpoint(too_few, enough);
-                    if meets(middle) {
-                        enough = middle;
-                    } else {
-                        too_few = middle;
-                    }
-                }
-                let least = work(made(enough).expect("it was made").statistics());
+                let (enough, least) = fewest(&made);
                 let ratio = work(&picked.work) as f64 / least as f64;
                 println!(
                     "{what}: {} steps of {}, all runs {:.2} of {enough} steps; error {error:.1e}, estimate {estimate:.1e}",
@@ -420,51 +369,68 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
     assert!(10 * sharp >= 9 * all, "{sharp} of {all}");
 }
 
+/// The error at all nodes, relative to the largest coordinate or momentum.
+fn largest_error<const N: usize>(motion: &Motion<N>, exact: &Motion<N>) -> f64 {
+    let largest = |part: fn(&Node<N>) -> [f64; N]| {
+        let size = |numbers: [f64; N]| {
+            numbers
+                .iter()
+                .fold(0.0, |size: f64, x| larger(size, x.abs()))
+        };
+        let nodes = motion.states().iter();
+        let off = nodes.clone().map(|node| {
+            let there = exact.at(node.t).expect("in the span");
+            distance(&part(node), &part(&there))
+        });
+        off.fold(0.0, larger) / nodes.map(|node| size(part(node))).fold(0.0, larger)
+    };
+    larger(largest(|node| node.q), largest(|node| node.p))
+}
+
+/// The fewest steps of a run that is good, as are those of one and of two steps more, and its work.
+fn fewest(made: &dyn Fn(u64) -> Option<u64>) -> (u64, u64) {
+    // Three successive numbers of steps must meet the accuracy: not only by chance.
+    let meets = |count: u64| (count..count + 3).all(|count| made(count).is_some());
+    let (mut too_few, mut enough) = (0, 1);
+    while !meets(enough) {
+        (too_few, enough) = (enough, 2 * enough);
+    }
+    while enough - too_few > 1 {
+        let middle = u64::midpoint(too_few, enough);
+        if meets(middle) {
+            enough = middle;
+        } else {
+            too_few = middle;
+        }
+    }
+    (enough, made(enough).expect("it was made"))
+}
+
 /// An iteration that starts from the result of another one for the same step ends after two increments, at the same
 /// state; from the result of another number of nodes, it ends sooner than by itself.
 #[test]
 fn what_one_element_has_found_serves_another() {
     struct Serves;
     impl Shown for Serves {
-        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>, span: f64)
-        where
-            M: tfe::runtime::Model<N>
-                + tfe::runtime::length::Declared<N, Length = tfe::runtime::length::FixedLength>,
-        {
-            let h = span / 60.0;
-            let stepper = |nodes: usize| {
-                let element = tfe::Element::mixed(nodes);
-                // Rounding errors may take a few more iterations.
-                let control = Control {
-                    tolerance: 1e-11,
-                    ..Control::default()
-                };
-                let stepper = Stepper::new(model, element, control);
-                let (mut stepper, mut state) = (stepper.expect("an element"), start);
-                stepper.advance(0.0, h, &mut state, &[]).expect("a step");
-                (stepper, state)
+        fn of<const N: usize>(&self, name: &str, mechanism: &dyn Moves<N>, span: f64) {
+            let step =
+                |nodes: usize, trail: &Trail| mechanism.second_step(nodes, span / 60.0, trail);
+            let alone = step(5, &Trail::new());
+            let trail = &alone.trail;
+            let off = |one: &State<N>, other: &State<N>| {
+                distance(&one.q, &other.q) + distance(&one.p, &other.p)
             };
-            let step = |nodes: usize, trail: &Trail| {
-                let (mut stepper, mut state) = stepper(nodes);
-                let before = stepper.statistics().iterations;
-                stepper.foresee(trail, (h, h));
-                stepper.advance(h, h, &mut state, &[]).expect("a step");
-                let iterations = stepper.statistics().iterations - before;
-                let mut left = Trail::new();
-                stepper.leave(&mut left);
-                (left, state, iterations)
-            };
-            let (trail, expected, alone) = step(5, &Trail::new());
-            let (_, state, again) = step(5, &trail);
-            let off = distance(&state.q, &expected.q) + distance(&state.p, &expected.p);
-            assert!(off < 1e-10, "{name}: {off:e}");
-            assert!(again <= 2, "{name}: {again} of {alone}");
-            let (_, exact, alone) = step(6, &Trail::new());
-            let (_, state, again) = step(6, &trail);
-            let off = distance(&state.q, &exact.q) + distance(&state.p, &exact.p);
-            assert!(off < 1e-10, "{name}: {off:e}");
-            assert!(again <= alone, "{name}: {again} of {alone}");
-            println!("{name:14} {alone} iterations, {again} with what was found");
+            let again = step(5, trail);
+            let apart = off(&again.end, &alone.end);
+            assert!(apart < 1e-10, "{name}: {apart:e}");
+            let (few, many) = (again.iterations, alone.iterations);
+            assert!(few <= 2, "{name}: {few} of {many}");
+            let (alone, again) = (step(6, &Trail::new()), step(6, trail));
+            let apart = off(&again.end, &alone.end);
+            assert!(apart < 1e-10, "{name}: {apart:e}");
+            let (few, many) = (again.iterations, alone.iterations);
+            assert!(few <= many, "{name}: {few} of {many}");
+            println!("{name:14} {many} iterations, {few} with what was found");
         }
     }
     each(&Serves);

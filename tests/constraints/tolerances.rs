@@ -1,9 +1,8 @@
 //! Loose tolerances and accuracies: iteration errors are small compared with them, and constraints hold.
 
 use crate::common::larger;
+use crate::moves::{Moves, Shown, show};
 use tfe::prelude::*;
-use tfe::runtime::Model;
-use tfe::runtime::length::{Declared, FixedLength};
 
 #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - 1)]
 struct Rod {
@@ -55,20 +54,19 @@ struct Pulled {
     g: f64,
 }
 
-/// What is tested for every model.
-trait Shown {
-    fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>)
-    where
-        M: Model<N> + Declared<N, Length = FixedLength>;
-}
-
+/// Six mechanisms.
 fn each(shown: &impl Shown) {
     let g = 9.81;
     let model = Rod { g };
-    shown.of("rod", &model, model.state([1.0, 0.0], [0.0; 2]));
+    show(
+        shown,
+        "rod",
+        (&model, model.state([1.0, 0.0], [0.0; 2])),
+        END,
+    );
     let model = TwoRods { g };
     let start = model.state([1.0, 1.0, 0.0, -1.0], [0.0, 0.5, 0.0, 0.0]);
-    shown.of("two rods", &model, start);
+    show(shown, "two rods", (&model, start), END);
     let model = SliderCrank { g };
     let (a, w) = (0.5_f64, 4.0);
     let b = (0.5 * a.sin()).asin();
@@ -77,14 +75,24 @@ fn each(shown: &impl Shown) {
         [a, b, a.cos() + 2.0 * b.cos()],
         [w, rate, -a.sin() * w - 2.0 * b.sin() * rate],
     );
-    shown.of("slider-crank", &model, start);
+    show(shown, "slider-crank", (&model, start), END);
     let model = Knife { g };
-    shown.of("knife", &model, model.state([0.0; 3], [0.0, 0.0, 1.3]));
+    show(
+        shown,
+        "knife",
+        (&model, model.state([0.0; 3], [0.0, 0.0, 1.3])),
+        END,
+    );
     let model = Redundant { g };
     let start = model.state([0.0, 1.0, std::f64::consts::FRAC_PI_2], [-1.0, 0.0, 1.0]);
-    shown.of("three rows", &model, start);
+    show(shown, "three rows", (&model, start), END);
     let model = Pulled { g };
-    shown.of("pulled", &model, model.state([1.0, 0.0], [0.1, 0.0]));
+    show(
+        shown,
+        "pulled",
+        (&model, model.state([1.0, 0.0], [0.1, 0.0])),
+        END,
+    );
 }
 
 const END: f64 = 4.0;
@@ -116,13 +124,9 @@ fn off_by_kind<const N: usize>(motion: &Motion<N>, exact: &Motion<N>) -> f64 {
     larger(of(|node| &node.q), of(|node| &node.p))
 }
 
-fn exact<M, const N: usize>(model: &M, start: State<N>) -> Motion<N>
-where
-    M: Model<N> + Declared<N, Length = FixedLength>,
-{
-    let run: Simulation<'_, M, N> = Simulation::new(model);
-    let run = run.element(Mixed::<8>).step(0.01);
-    run.run(start, 0.0..END).expect("a run")
+fn exact<const N: usize>(mechanism: &dyn Moves<N>) -> Motion<N> {
+    let run = mechanism.run(Element::mixed(8), 0.01, END);
+    run.expect("a run")
 }
 
 /// Loose tolerances used to end with the error "the constraints are dependent", which was false.
@@ -130,17 +134,13 @@ where
 fn loose_tolerances_are_no_contradictions() {
     struct Tolerances;
     impl Shown for Tolerances {
-        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>)
-        where
-            M: Model<N> + Declared<N, Length = FixedLength>,
-        {
-            let exact = exact(model, start);
+        fn of<const N: usize>(&self, name: &str, mechanism: &dyn Moves<N>, _: f64) {
+            let exact = exact(mechanism);
             for nodes in [3, 4, 6] {
-                let run: Simulation<'_, M, N> = Simulation::new(model);
-                let run = run.element(Element::mixed(nodes)).step(0.02);
-                let tight = run.run(start, 0.0..END).expect("a run");
+                let element = Element::mixed(nodes);
+                let tight = mechanism.run(element, 0.02, END).expect("a run");
                 for tolerance in [1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8] {
-                    let loose = run.clone().tolerance(tolerance).run(start, 0.0..END);
+                    let loose = mechanism.run_within(tolerance, (element, 0.02), END);
                     let what = format!("{name}, {nodes} nodes, {tolerance:e}");
                     let loose = loose.unwrap_or_else(|error| panic!("{what}: {error}"));
                     let (off, best) = (off(&loose, &exact), off(&tight, &exact));
@@ -161,14 +161,10 @@ fn loose_tolerances_are_no_contradictions() {
 fn accuracies_are_met_with_constraints() {
     struct Accuracies;
     impl Shown for Accuracies {
-        fn of<M, const N: usize>(&self, name: &str, model: &M, start: State<N>)
-        where
-            M: Model<N> + Declared<N, Length = FixedLength>,
-        {
-            let exact = exact(model, start);
+        fn of<const N: usize>(&self, name: &str, mechanism: &dyn Moves<N>, _: f64) {
+            let exact = exact(mechanism);
             for accuracy in [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10] {
-                let run: Simulation<'_, M, N> = Simulation::new(model);
-                let motion = run.accuracy(accuracy).run(start, 0.0..END);
+                let motion = mechanism.run_accurately(accuracy, END);
                 let what = format!("{name}, {accuracy:e}");
                 let motion = motion.unwrap_or_else(|error| panic!("{what}: {error}"));
                 let off = off_by_kind(&motion, &exact);
