@@ -39,6 +39,30 @@ impl RodPendulumRates {
     }
 }
 
+/// A slider-crank: the crank of length one, the rod of length two without mass, and the slider on the line y = 0.
+#[dynamics(
+    coordinates(a, b, x),
+    lagrangian = j/2*dot(a)^2 + k/2*dot(b)^2 + m/2*dot(x)^2 - g*sin(a),
+    constraint(cx) = cos(a) + 2*cos(b) - x,
+    constraint(cy) = sin(a) - 2*sin(b),
+)]
+pub struct SliderCrank {
+    pub j: f64,
+    pub k: f64,
+    pub m: f64,
+    pub g: f64,
+}
+
+impl SliderCrank {
+    /// At an angle of the crank and a rate.
+    pub fn turning(&self, a: f64, rate: f64) -> State<3> {
+        let b = (a.sin() / 2.0).asin();
+        let rate_b = rate * a.cos() / (2.0 * b.cos());
+        let v = -a.sin() * rate - 2.0 * b.sin() * rate_b;
+        self.state([a, b, a.cos() + 2.0 * b.cos()], [rate, rate_b, v])
+    }
+}
+
 /// A bead on the wire y = x⁴/4, y upwards: φ is not quadratic.
 #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(wire) = y - x^4/4)]
 pub struct Bead {

@@ -389,9 +389,9 @@ macro_rules! circle {
             lagrangian = (dot(x)^2 + dot(y)^2)/2 + j/2*dot(th)^2 - g*y,
             $(constraint($constraint) = $row),+
         )]
-        struct $name {
-            j: f64,
-            g: f64,
+        pub struct $name {
+            pub j: f64,
+            pub g: f64,
         }
     };
 }

@@ -4,7 +4,7 @@
 use crate::common::{distance, larger};
 use crate::models::{
     Andrews, Bead, BeadRates, KnifeEdge, MovingGround, MovingWire, ON_WIRE, QuaternionTop,
-    RodPendulum, RodPendulumRates,
+    RodPendulum, RodPendulumRates, SliderCrank,
 };
 use crate::moves::{Moves, Scene, Shown, show};
 use crate::overconstrained::plate;
@@ -12,30 +12,6 @@ use std::cell::{Cell, RefCell};
 use tfe::prelude::*;
 use tfe::runtime::Statistics;
 use tfe::runtime::constrained::Trail;
-
-#[dynamics(
-    coordinates(x, y),
-    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
-    constraint(rod) = x^2 + y^2 - l^2,
-)]
-struct Rod {
-    m: f64,
-    g: f64,
-    l: f64,
-}
-
-#[dynamics(
-    coordinates(a, b, x),
-    lagrangian = j/2*dot(a)^2 + k/2*dot(b)^2 + m/2*dot(x)^2 - g*sin(a),
-    constraint(cx) = cos(a) + 2*cos(b) - x,
-    constraint(cy) = sin(a) - 2*sin(b),
-)]
-struct SliderCrank {
-    j: f64,
-    k: f64,
-    m: f64,
-    g: f64,
-}
 
 const STEPS: [f64; 9] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9];
 
@@ -62,34 +38,21 @@ fn runs<const N: usize>(mechanism: &dyn Moves<N>) {
 
 #[test]
 fn a_rod_takes_steps_of_any_size() {
-    let rod = Rod {
-        m: 1.0,
-        g: 9.81,
-        l: 1.0,
-    };
-    let start = rod.state([0.6, -0.8], [0.4, 0.3]);
-    runs(Scene { model: &rod, start }.moves());
+    let model = &RodPendulum::UNIT;
+    let start = model.state([0.6, -0.8], [0.4, 0.3]);
+    runs(Scene { model, start }.moves());
 }
 
-fn slider_crank() -> (SliderCrank, State<3>) {
-    let crank = SliderCrank {
-        j: 0.5,
-        k: 0.2,
-        m: 1.0,
-        g: 3.0,
-    };
-    let (a, va) = (0.7_f64, 1.3);
-    let b = (a.sin() / 2.0).asin();
-    let vb = va * a.cos() / (2.0 * b.cos());
-    let vx = -a.sin() * va - 2.0 * b.sin() * vb;
-    let start = crank.state([a, b, a.cos() + 2.0 * b.cos()], [va, vb, vx]);
-    (crank, start)
-}
+const CRANK: SliderCrank = SliderCrank {
+    j: 0.5,
+    k: 0.2,
+    m: 1.0,
+    g: 3.0,
+};
 
 #[test]
 fn a_slider_crank_takes_steps_of_any_size() {
-    let (crank, start) = slider_crank();
-    let model = &crank;
+    let (model, start) = (&CRANK, CRANK.turning(0.7, 1.3));
     runs(Scene { model, start }.moves());
 }
 
@@ -166,19 +129,10 @@ fn each(shown: &impl Shown) {
     let (plate, start) = plate();
     show(shown, "plate", (&plate, start), 3.0);
     show(shown, SQUEEZER, (&Andrews, Andrews.at_rest()), 0.01);
-    let (crank, start) = slider_crank();
-    show(shown, "slider-crank", (&crank, start), 3.0);
-    let rod = Rod {
-        m: 1.0,
-        g: 9.81,
-        l: 1.0,
-    };
-    show(
-        shown,
-        "fast rod",
-        (&rod, rod.state([0.6, -0.8], [4.0, 3.0])),
-        3.0,
-    );
+    let start = CRANK.turning(0.7, 1.3);
+    show(shown, "slider-crank", (&CRANK, start), 3.0);
+    let start = rod.state([0.6, -0.8], [4.0, 3.0]);
+    show(shown, "fast rod", (&rod, start), 3.0);
 }
 
 #[test]

@@ -1,13 +1,10 @@
 //! Loose tolerances and accuracies: iteration errors are small compared with them, and constraints hold.
 
 use crate::common::larger;
+use crate::models::{KnifeEdge, RodPendulum, SliderCrank};
 use crate::moves::{Moves, Shown, show};
+use crate::redundant::ThreeRows;
 use tfe::prelude::*;
-
-#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - 1)]
-struct Rod {
-    g: f64,
-}
 
 #[dynamics(
     coordinates(x[2], y[2]),
@@ -19,36 +16,6 @@ struct TwoRods {
     g: f64,
 }
 
-#[dynamics(
-    coordinates(a, b, x),
-    lagrangian = (0.3*dot(a)^2 + 0.7*dot(b)^2 + dot(x)^2)/2 - g*sin(a),
-    constraint(cx) = cos(a) + 2*cos(b) - x,
-    constraint(cy) = sin(a) - 2*sin(b),
-)]
-struct SliderCrank {
-    g: f64,
-}
-
-#[dynamics(
-    coordinates(x, y, phi),
-    lagrangian = (dot(x)^2 + dot(y)^2 + dot(phi)^2)/2 + g*x,
-    constraint(blade) = dot(x)*sin(phi) - dot(y)*cos(phi),
-)]
-struct Knife {
-    g: f64,
-}
-
-#[dynamics(
-    coordinates(x, y, a),
-    lagrangian = (dot(x)^2 + dot(y)^2)/2 + dot(a)^2/20 - g*y,
-    constraint(cx) = x - cos(a),
-    constraint(cy) = y - sin(a),
-    constraint(circle) = x^2 + y^2 - 1,
-)]
-struct Redundant {
-    g: f64,
-}
-
 #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - (1 + sin(t)/10)^2)]
 struct Pulled {
     g: f64,
@@ -57,33 +24,21 @@ struct Pulled {
 /// Six mechanisms.
 fn each(shown: &impl Shown) {
     let g = 9.81;
-    let model = Rod { g };
-    show(
-        shown,
-        "rod",
-        (&model, model.state([1.0, 0.0], [0.0; 2])),
-        END,
-    );
+    let model = RodPendulum::UNIT;
+    show(shown, "rod", (&model, model.horizontal()), END);
     let model = TwoRods { g };
     let start = model.state([1.0, 1.0, 0.0, -1.0], [0.0, 0.5, 0.0, 0.0]);
     show(shown, "two rods", (&model, start), END);
-    let model = SliderCrank { g };
-    let (a, w) = (0.5_f64, 4.0);
-    let b = (0.5 * a.sin()).asin();
-    let rate = 0.5 * a.cos() * w / b.cos();
-    let start = model.state(
-        [a, b, a.cos() + 2.0 * b.cos()],
-        [w, rate, -a.sin() * w - 2.0 * b.sin() * rate],
-    );
+    let (j, k, m) = (0.3, 0.7, 1.0);
+    let model = SliderCrank { j, k, m, g };
+    let start = model.turning(0.5, 4.0);
     show(shown, "slider-crank", (&model, start), END);
-    let model = Knife { g };
-    show(
-        shown,
-        "knife",
-        (&model, model.state([0.0; 3], [0.0, 0.0, 1.3])),
-        END,
-    );
-    let model = Redundant { g };
+    let model = KnifeEdge {
+        alpha: std::f64::consts::FRAC_PI_2,
+        ..KnifeEdge::TABLE
+    };
+    show(shown, "knife", (&model, model.turning(1.3)), END);
+    let model = ThreeRows { j: 0.1, g };
     let start = model.state([0.0, 1.0, std::f64::consts::FRAC_PI_2], [-1.0, 0.0, 1.0]);
     show(shown, "three rows", (&model, start), END);
     let model = Pulled { g };
