@@ -164,24 +164,27 @@ pub fn axes([a, b, c, d]: [f64; 4]) -> [[f64; 3]; 3] {
     ]
 }
 
-/// A blade on an incline: it can slide along its heading φ, not across. x points downhill.
+/// A body on a blade on an incline: the blade, at the distance a behind the centre of mass (x, y), can slide along its
+/// heading φ, not across. x points downhill.
 #[dynamics(
     coordinates(x, y, phi),
     lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(phi)^2 + m*g*sin(alpha)*x,
-    constraint(blade) = dot(x)*sin(phi) - dot(y)*cos(phi),
+    constraint(blade) = dot(x)*sin(phi) - dot(y)*cos(phi) + a*dot(phi),
 )]
 pub struct KnifeEdge {
     pub m: f64,
     pub j: f64,
+    pub a: f64,
     pub g: f64,
     pub alpha: f64,
 }
 
 impl KnifeEdge {
-    /// m = I = 1 on an incline of 30°.
+    /// m = I = 1, the blade below the centre of mass, on an incline of 30°.
     pub const TABLE: Self = Self {
         m: 1.0,
         j: 1.0,
+        a: 0.0,
         g: 9.81,
         alpha: std::f64::consts::FRAC_PI_6,
     };
