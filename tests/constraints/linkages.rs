@@ -2,6 +2,7 @@
 //! the parallelogram could fold into its mirror image; only the motion before the position determines that it does not.
 
 use crate::common::{distance, larger};
+use crate::models::Pendulum;
 use crate::runs::run;
 use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
@@ -29,19 +30,6 @@ pub struct Parallelogram {
     g: f64,
 }
 
-/// As long as it remains a parallelogram, it moves as a pendulum.
-#[dynamics(
-    coordinates(left),
-    lagrangian = (2*j + m*r^2)/2*dot(left)^2 - (m + mc)*g*r*sin(left),
-)]
-pub struct OneAngle {
-    r: f64,
-    m: f64,
-    mc: f64,
-    j: f64,
-    g: f64,
-}
-
 pub const LINKAGE: Parallelogram = Parallelogram {
     r: 0.5,
     d: 1.2,
@@ -52,12 +40,10 @@ pub const LINKAGE: Parallelogram = Parallelogram {
     g: 9.81,
 };
 
-pub const ONE_ANGLE: OneAngle = OneAngle {
-    r: LINKAGE.r,
-    m: LINKAGE.m,
-    mc: LINKAGE.mc,
-    j: LINKAGE.j,
-    g: LINKAGE.g,
+/// As long as it remains a parallelogram, it moves as a pendulum.
+pub const ONE_ANGLE: Pendulum = Pendulum {
+    inertia: 2.0 * LINKAGE.j + LINKAGE.m * LINKAGE.r * LINKAGE.r,
+    weight: (LINKAGE.m + LINKAGE.mc) * LINKAGE.g * LINKAGE.r,
 };
 
 pub fn parallel(angle: f64, rate: f64) -> State<3> {

@@ -39,6 +39,14 @@ impl RodPendulumRates {
     }
 }
 
+/// A pendulum by its angle from the horizontal, with the moment of its weight: what mechanisms of one degree of freedom
+/// are compared with.
+#[dynamics(coordinates(angle), lagrangian = inertia/2*dot(angle)^2 - weight*sin(angle))]
+pub struct Pendulum {
+    pub inertia: f64,
+    pub weight: f64,
+}
+
 /// A slider-crank: the crank of length one, the rod of length two without mass, and the slider on the line y = 0.
 #[dynamics(
     coordinates(a, b, x),

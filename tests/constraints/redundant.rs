@@ -1,7 +1,7 @@
 //! Redundant constraints, of which some follow from others: the rank is reported, and the motion is the same.
 
 use crate::common::distance;
-use crate::models::RodPendulum;
+use crate::models::{Pendulum, RodPendulum};
 use crate::runs::{differences, run};
 use std::ops::RangeInclusive;
 use tfe::prelude::*;
@@ -374,14 +374,7 @@ fn a_four_bar_linkage_in_space() {
     assert!((flat.last().q[0] - angles[0]).abs() > 1.0);
 }
 
-/// A bead on the unit circle, x = cos θ and y = sin θ, with a flywheel: as a model in the angle.
-#[dynamics(coordinates(th), lagrangian = (1 + j)/2*dot(th)^2 - g*sin(th))]
-struct Angle {
-    j: f64,
-    g: f64,
-}
-
-/// Declares the same with constraints.
+/// Declares a bead on the unit circle, x = cos θ and y = sin θ, with a flywheel.
 macro_rules! circle {
     ($name:ident, $($constraint:ident = $row:expr),+) => {
         #[dynamics(
@@ -449,9 +442,12 @@ macro_rules! angle_of {
 /// nodes and h = 0.05 off by 2e-4, three nodes and h = 0.0037 by 4e-2.
 #[track_caller]
 fn a_third_row_is_as_good_as_two(nodes: RangeInclusive<usize>) {
-    let angle = Angle { j: 0.1, g: 9.81 };
-    let start = angle.state([std::f64::consts::FRAC_PI_2], [1.0]);
-    let fine = Simulation::new(&angle).element(Mixed::<8>).step(0.002);
+    let pendulum = Pendulum {
+        inertia: 1.0 + 0.1,
+        weight: 9.81,
+    };
+    let start = pendulum.state([std::f64::consts::FRAC_PI_2], [1.0]);
+    let fine = Simulation::new(&pendulum).element(Mixed::<8>).step(0.002);
     let exact = fine.run(start, 0.0..10.0).expect("a run").last().q[0];
     for nodes in nodes {
         // Step sizes at which the error is asymptotic.
