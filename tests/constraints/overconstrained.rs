@@ -1,6 +1,7 @@
 //! Mechanisms that move although they have as many constraints as coordinates, or more.
 
 use crate::common::{distance, larger};
+use crate::runs::run;
 use tfe::prelude::*;
 use tfe::runtime::length::{Declared, FixedLength};
 
@@ -25,44 +26,37 @@ struct Door {
     slope: f64,
 }
 
-/// Declares a plate on parallel bars of length one. (Rows that are multiples of others are refused at the declaration.)
-macro_rules! plate {
-    ($name:ident, $($bar:ident = $row:expr),+) => {
-        #[dynamics(
-            coordinates(x, y, th),
-            let x2 = x + l*cos(th), let y2 = y + l*sin(th),
-            let x3 = x + 2*l*cos(th), let y3 = y + 2*l*sin(th),
-            lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(th)^2 - m*g*y,
-            $(constraint($bar) = $row),+
-        )]
-        #[derive(Clone, Copy)]
-        pub struct $name {
-            m: f64,
-            j: f64,
-            l: f64,
-            g: f64,
-        }
-    };
+/// A plate on parallel bars of length one.
+#[dynamics(
+    coordinates(x, y, th),
+    let x2 = x + l*cos(th), let y2 = y + l*sin(th),
+    let x3 = x + 2*l*cos(th), let y3 = y + 2*l*sin(th),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(th)^2 - m*g*y,
+    constraint(one) = x^2 + y^2 - 1,
+    constraint(two) = (x2 - l)^2 + y2^2 - 1,
+    constraint(three) = (x3 - 2*l)^2 + y3^2 - 1,
+)]
+pub struct Plate {
+    m: f64,
+    j: f64,
+    l: f64,
+    g: f64,
 }
 
-plate!(
-    Plate,
-    one = x ^ 2 + y ^ 2 - 1,
-    two = (x2 - l) ^ 2 + y2 ^ 2 - 1,
-    three = (x3 - 2 * l) ^ 2 + y3 ^ 2 - 1
-);
-plate!(
-    Permuted,
-    three = (x3 - 2 * l) ^ 2 + y3 ^ 2 - 1,
-    one = x ^ 2 + y ^ 2 - 1,
-    two = (x2 - l) ^ 2 + y2 ^ 2 - 1
-);
-plate!(
-    Scaled,
-    one = 1e6 * (x ^ 2 + y ^ 2 - 1),
-    two = (x2 - l) ^ 2 + y2 ^ 2 - 1,
-    three = 1e-6 * ((x3 - 2 * l) ^ 2 + y3 ^ 2 - 1)
-);
+/// The same with rows in any order and of any size, and the distances of the bars from the first one.
+#[dynamics(
+    coordinates(x, y, th),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) + j/2*dot(th)^2 - m*g*y,
+    constraint(bar[i in 0..3]) = size[i]*((x + at[i]*cos(th) - at[i])^2 + (y + at[i]*sin(th))^2 - 1),
+)]
+struct PlateByRows {
+    m: f64,
+    j: f64,
+    g: f64,
+    at: [f64; 3],
+    size: [f64; 3],
+}
+
 /// Bricard's orthogonal linkage, a closed chain of six revolute joints: six tetrahedra, each hinged to the next along
 /// an edge, described by the ends a, b of the hinges. The first one is fixed. 24 equations of rank 23 for 24
 /// coordinates.
@@ -250,19 +244,15 @@ pub fn plate() -> (Plate, State<3>) {
 fn a_plate_on_three_bars() {
     let (plate, start) = plate();
     keeps_its_order(&plate, start, (0.05, 2));
+    let Plate { m, j, l, g } = plate;
+    let by_rows = |at: [f64; 3], size: [f64; 3]| PlateByRows { m, j, g, at, size };
+    let permuted = by_rows([2.0 * l, 0.0, l], [1.0; 3]);
+    let scaled = by_rows([0.0, l, 2.0 * l], [1e6, 1.0, 1e-6]);
     for nodes in [2, 3, 4, 6] {
-        macro_rules! end {
-            ($name:ident) => {{
-                let Plate { m, j, l, g } = plate;
-                let plate = $name { m, j, l, g };
-                let run = Simulation::new(&plate).element(Element::mixed(nodes));
-                let motion = run.step(0.05).run(start, 0.0..5.0).expect("a run");
-                motion.last().q
-            }};
-        }
-        let expected = end!(Plate);
-        let others = [end!(Permuted), end!(Scaled)];
-        for (rows, other) in ["permuted", "scaled"].iter().zip(others) {
+        let element = Element::mixed(nodes);
+        let expected = run(&plate, element, 0.05, start, 5.0).last().q;
+        for (rows, model) in [("permuted", &permuted), ("scaled", &scaled)] {
+            let other = run(model, element, 0.05, start, 5.0).last().q;
             let off = distance(&expected, &other);
             assert!(off < 1e-12, "{nodes} nodes, {rows}: {off:e}");
         }
