@@ -22,6 +22,7 @@ mod reference_values;
 mod runs;
 mod singular;
 mod small_steps;
+mod spatial_four_bar;
 mod stability;
 mod starts;
 mod symplectic;

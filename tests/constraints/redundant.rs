@@ -3,6 +3,7 @@
 use crate::common::distance;
 use crate::models::{Pendulum, RodPendulum};
 use crate::runs::{differences, run};
+use crate::spatial_four_bar::SpatialFourBar;
 use std::ops::RangeInclusive;
 use tfe::prelude::*;
 
@@ -231,50 +232,7 @@ fn two_equations_for_one_blade() {
     assert!(distance(&end.q, &expected) < 1e-10, "{end:?}");
 }
 
-/// A spatial four-bar linkage of three bodies: unit quaternions, ball joints at four points, and two further conditions
-/// at each of them that make it a hinge perpendicular to the plane. 23 equations for 21 coordinates and one degree of
-/// freedom: three of them are redundant.
-#[dynamics(
-    coordinates(r1[3], e1[4], r2[3], e2[4], r3[3], e3[4]),
-    let w1 = body_rate(e1),
-    let w2 = body_rate(e2),
-    let w3 = body_rate(e3),
-    let h1 = rotate(e1, [l1/2, 0, 0]),
-    let h2 = rotate(e2, [l2/2, 0, 0]),
-    let h3 = rotate(e3, [l3/2, 0, 0]),
-    let n1 = rotate(e1, [0, 0, 1]),
-    let n3 = rotate(e3, [0, 0, 1]),
-    lagrangian = m1/2*inner(dot(r1), dot(r1)) + m2/2*inner(dot(r2), dot(r2)) + m3/2*inner(dot(r3), dot(r3))
-        + m1*l1^2/24*(w1[0]^2/50 + w1[1]^2 + w1[2]^2) + m2*l2^2/24*(w2[0]^2/50 + w2[1]^2 + w2[2]^2)
-        + m3*l3^2/24*(w3[0]^2/50 + w3[1]^2 + w3[2]^2) - g*(m1*r1[1] + m2*r2[1] + m3*r3[1]),
-    constraint(unit1) = inner(e1, e1) - 1,
-    constraint(unit2) = inner(e2, e2) - 1,
-    constraint(unit3) = inner(e3, e3) - 1,
-    constraint(a) = r1 - h1,
-    constraint(b) = r1 + h1 - r2 + h2,
-    constraint(c) = r2 + h2 - r3 - h3,
-    constraint(d) = r3 - h3 - [ground, 0, 0],
-    constraint(hinge_a1) = n1[0],
-    constraint(hinge_a2) = n1[1],
-    constraint(hinge_b1) = inner(n1, rotate(e2, [1, 0, 0])),
-    constraint(hinge_b2) = inner(n1, rotate(e2, [0, 1, 0])),
-    constraint(hinge_c1) = inner(n3, rotate(e2, [1, 0, 0])),
-    constraint(hinge_c2) = inner(n3, rotate(e2, [0, 1, 0])),
-    constraint(hinge_d1) = n3[0],
-    constraint(hinge_d2) = n3[1],
-)]
-struct SpatialFourBar {
-    l1: f64,
-    l2: f64,
-    l3: f64,
-    ground: f64,
-    m1: f64,
-    m2: f64,
-    m3: f64,
-    g: f64,
-}
-
-/// The same in the plane: three angles, two equations.
+/// A four-bar linkage in the plane: three angles, two equations. The first and the last bar begin on the ground.
 #[dynamics(
     coordinates(a1, a2, a3),
     let x1 = l1/2*cos(a1), let y1 = l1/2*sin(a1),
@@ -296,6 +254,7 @@ struct PlanarFourBar {
     g: f64,
 }
 
+/// The same linkage of bodies in space, with seven equations more than are independent.
 #[test]
 fn a_four_bar_linkage_in_space() {
     // The crank stands up at (0, ½), the coupler goes from there to (1, 0.9), the rocker from (1.2, 0).
@@ -316,6 +275,8 @@ fn a_four_bar_linkage_in_space() {
         l2,
         l3,
         ground,
+        alpha: 0.0,
+        beta: 0.0,
         m1,
         m2,
         m3,
@@ -338,9 +299,11 @@ fn a_four_bar_linkage_in_space() {
         [-0.5 * w1 - 0.2 * rates[1], 0.5 * rates[1]],
         [-0.45 * w3, -0.1 * w3],
     ];
+    // In space, the last bar ends on the ground.
+    let turned = [0.0, 0.0, -std::f64::consts::PI];
     let (mut q, mut v) = ([0.0; 21], [0.0; 21]);
     for body in 0..3 {
-        let (half, at) = (angles[body] / 2.0, 7 * body);
+        let (half, at) = ((angles[body] + turned[body]) / 2.0, 7 * body);
         q[at..at + 2].copy_from_slice(&middles[body]);
         v[at..at + 2].copy_from_slice(&speeds[body]);
         (q[at + 3], q[at + 6]) = (half.cos(), half.sin());
@@ -349,13 +312,13 @@ fn a_four_bar_linkage_in_space() {
     }
     let flat = run(&planar, Mixed::<6>, 0.01, planar.state(angles, rates), 0.5);
     let motion = run(&spatial, Mixed::<5>, 0.01, spatial.state(q, v), 0.5);
-    assert_eq!(motion.reactions().names().len(), 23);
+    assert_eq!(motion.reactions().names().len(), 27);
     assert_eq!(motion.constraint_residual().rank, 20);
     assert!(motion.constraint_residual().position < 1e-13);
     assert!(motion.constraint_residual().velocity < 1e-12);
     for (k, (a, b)) in motion.states().iter().zip(flat.states()).enumerate() {
         for body in 0..3 {
-            let (half, at) = (b.q[body] / 2.0, 7 * body);
+            let (half, at) = ((b.q[body] + turned[body]) / 2.0, 7 * body);
             // Order 8 with steps of 0.01.
             assert!(
                 (a.q[at + 3] - half.cos()).abs() < 1e-9

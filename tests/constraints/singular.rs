@@ -4,6 +4,7 @@
 use crate::linkages::{LINKAGE, ONE_ANGLE, error, parallel};
 use crate::models::Pendulum;
 use crate::overconstrained::{energies_off, long_steps};
+use crate::spatial_four_bar::SpatialFourBar;
 use tfe::prelude::*;
 
 /// Differences in time between a node and a singular position.
@@ -131,38 +132,6 @@ fn checkpoints_at_singular_nodes() {
     assert_eq!(first.statistics().cuts, 1);
 }
 
-/// Bennett's linkage.
-#[dynamics(
-    coordinates(r1[3], e1[4], r2[3], e2[4], r3[3], e3[4]),
-    let w1 = body_rate(e1),
-    let w2 = body_rate(e2),
-    let w3 = body_rate(e3),
-    let h1 = rotate(e1, [a/2, 0, 0]),
-    let h2 = rotate(e2, [b/2, 0, 0]),
-    let h3 = rotate(e3, [a/2, 0, 0]),
-    lagrangian = inner(dot(r1), dot(r1))/2 + inner(dot(r2), dot(r2))/2 + inner(dot(r3), dot(r3))/2
-        + a^2/24*(w1[0]^2/50 + w1[1]^2 + w1[2]^2) + b^2/24*(w2[0]^2/50 + w2[1]^2 + w2[2]^2)
-        + a^2/24*(w3[0]^2/50 + w3[1]^2 + w3[2]^2) - g*(r1[1] + r2[1] + r3[1]),
-    constraint(unit1) = inner(e1, e1) - 1,
-    constraint(unit2) = inner(e2, e2) - 1,
-    constraint(unit3) = inner(e3, e3) - 1,
-    constraint(at_a) = r1 - h1,
-    constraint(at_b) = r1 + h1 - r2 + h2,
-    constraint(at_c) = r2 + h2 - r3 + h3,
-    constraint(at_d) = r3 + h3 - [-b, 0, 0],
-    constraint(axis_a) = rotate(e1, [0, 0, 1]) - [0, 0, 1],
-    constraint(axis_b) = rotate(e1, [0, -sin(alpha), cos(alpha)]) - rotate(e2, [0, 0, 1]),
-    constraint(axis_c) = rotate(e2, [0, -sin(beta), cos(beta)]) - rotate(e3, [0, 0, 1]),
-    constraint(axis_d) = rotate(e3, [0, -sin(alpha), cos(alpha)]) - [0, sin(beta), cos(beta)],
-)]
-struct Bennett {
-    a: f64,
-    b: f64,
-    alpha: f64,
-    beta: f64,
-    g: f64,
-}
-
 type Quaternion = [f64; 4];
 
 fn times(a: Quaternion, b: Quaternion) -> Quaternion {
@@ -180,12 +149,13 @@ fn turned(e: Quaternion, x: [f64; 3]) -> [f64; 3] {
     rest
 }
 
-impl Bennett {
+impl SpatialFourBar {
+    /// Bennett's linkage, by the angle of its first joint.
     fn at(&self, theta: f64, rate: f64) -> State<21> {
         let ratio = (0.5 * (self.beta + self.alpha)).sin() / (0.5 * (self.beta - self.alpha)).sin();
         let second = 2.0 * (ratio / (0.5 * theta).tan()).atan();
         let angles = [theta, second, -theta];
-        let lengths = [self.a, self.b, self.a];
+        let lengths = [self.l1, self.l2, self.l3];
         let twists = [self.alpha, self.beta, self.alpha];
         let (mut place, mut e) = ([0.0; 3], [1.0, 0.0, 0.0, 0.0]);
         let mut q = [0.0; 21];
@@ -222,6 +192,7 @@ impl Bennett {
         v[3..7].copy_from_slice(&spin);
         self.project(q, v)
     }
+
     fn project(&self, q: [f64; 21], v: [f64; 21]) -> State<21> {
         let start = self.consistent_state(q, v).expect("consistent");
         assert!(start.position < 1e-14, "closed: {:e}", start.position);
@@ -230,15 +201,21 @@ impl Bennett {
     }
 }
 
-/// 27 equations, of which 20 are independent, for 21 coordinates.
+/// Bennett's linkage: 27 equations, of which 20 are independent, for 21 coordinates.
 #[test]
 fn bennett() {
     let alpha = 0.6_f64;
-    let model = Bennett {
-        a: 1.0,
-        b: 1.4,
+    let (bar, coupler) = (1.0, 1.4);
+    let model = SpatialFourBar {
+        l1: bar,
+        l2: coupler,
+        l3: bar,
+        ground: -coupler,
         alpha,
         beta: (1.4 * alpha.sin()).asin(),
+        m1: 1.0,
+        m2: 1.0,
+        m3: 1.0,
         g: 9.81,
     };
     let start = model.at(1.0, 1.0);
