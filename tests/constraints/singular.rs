@@ -30,8 +30,11 @@ fn root(motion: &Motion<1>) -> f64 {
 
 /// Steps such that node `node` lies close to a given time.
 fn steps(when: f64, node: f64) -> impl Iterator<Item = f64> {
-    let sides = BESIDE.into_iter().flat_map(|beside| [-beside, beside]);
-    sides.map(move |beside| (when + beside) / node)
+    let after = BESIDE.into_iter();
+    let before = after.clone().skip(1).map(|beside| -beside);
+    after
+        .chain(before)
+        .map(move |beside| (when + beside) / node)
 }
 
 /// Rows that vanish: a parallelogram in angles.
@@ -82,23 +85,31 @@ fn nodes_where_all_bars_are_in_line() {
         weight: 3.5 * chain.g,
     };
     let (angle, rate) = (0.5 * std::f64::consts::PI, -1.0);
-    let (c, s) = (angle.cos(), angle.sin());
-    let (x, y) = (-s * rate, c * rate);
-    let start = chain.state([c, 1.0 + c, 2.0 + c, s, s, s], [x, x, x, y, y, y]);
     let exact = Simulation::new(&one)
         .element(Mixed::<10>)
         .step(0.002)
         .run(one.state([angle], [rate]), 0.0..1.5)
         .expect("a pendulum");
     let when = root(&exact);
+    // Twelve steps before the position and fifty behind it.
+    let begin = (exact.states().iter()).rfind(|node| node.t < 0.76 * when);
+    let &Node {
+        t: begin,
+        q: [angle],
+        v: [rate],
+        ..
+    } = begin.expect("a node of the pendulum");
+    let (c, s) = (angle.cos(), angle.sin());
+    let (x, y) = (-s * rate, c * rate);
+    let start = chain.state([c, 1.0 + c, 2.0 + c, s, s, s], [x, x, x, y, y, y]);
     // The order is 2(n − 1), as at other nodes.
     for (nodes, most) in [(3, 2e-6), (4, 3e-10), (6, 2e-12)] {
-        for step in steps(when, 50.0) {
+        for step in steps(when - begin, 12.0) {
             let what = format!("{nodes} nodes, h = {step:e}");
             let run = Simulation::new(&chain).element(Element::mixed(nodes));
             let motion = run
                 .step(step)
-                .run(start, 0.0..100.0 * step)
+                .run(start, begin..begin + 62.0 * step)
                 .unwrap_or_else(|error| panic!("{what}: {error}"));
             for node in motion.states() {
                 let angle = exact.at(node.t).expect("within").q[0];
