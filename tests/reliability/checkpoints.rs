@@ -3,16 +3,13 @@
 use tfe::prelude::*;
 use tfe::{RunErrorKind, Warning};
 
+use super::models::{Coupled, Damped, Rod};
 use super::{Kepler, Oscillator, PENDULUM};
 
-#[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y, constraint(rod) = x^2 + y^2 - l^2)]
-struct Rod {
-    g: f64,
-    l: f64,
+fn rod(l: f64) -> Rod {
+    let (g, s) = (9.81, 1.0);
+    Rod { g, l, s }
 }
-
-#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - x^2/2, force(x) = -0.1*dot(x))]
-struct Damped;
 
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - 1e6*(x - cos(t))^2/2, force(x) = -1e3*dot(x))]
 struct Stiff;
@@ -74,7 +71,13 @@ fn two_halves_are_one_run_to_the_bit() {
             50,
             &mut seed,
         );
-        let damped = Simulation::new(&Damped).element(element).step(0.07);
+        let damped = Damped {
+            m: 1.0,
+            k: 1.0,
+            g: 0.0,
+            c: 0.1,
+        };
+        let damped = Simulation::new(&damped).element(element).step(0.07);
         check(
             &damped,
             State { q: [2.0], p: [0.0] },
@@ -92,7 +95,7 @@ fn two_halves_are_one_run_to_the_bit() {
             &mut seed,
         );
     }
-    let rod = Rod { g: 9.81, l: 1.0 };
+    let rod = rod(1.0);
     for nodes in [2, 3, 4, 5] {
         let simulation = Simulation::new(&rod)
             .element(Element::mixed(nodes))
@@ -178,12 +181,11 @@ fn other_vectors_go_on_from_a_checkpoint() {
 /// For a checkpoint of a model with other parameters, nothing that depends on these is carried over.
 #[test]
 fn other_parameters_go_on_from_a_checkpoint() {
-    #[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - k*x^2/2 - y^2/2)]
-    struct Spring {
-        m: f64,
-        k: f64,
-    }
-    let (soft, stiff) = (Spring { m: 1.0, k: 1.0 }, Spring { m: 2.0, k: 4.0 });
+    let springs = |m, k| {
+        let (c, l) = (0.0, 1.0);
+        Coupled { m, c, k, l }
+    };
+    let (soft, stiff) = (springs(1.0, 1.0), springs(2.0, 4.0));
     let run = |model| {
         let run = Simulation::new(model).element(Element::mixed(6)).step(0.1);
         run.record_every(10)
@@ -206,7 +208,7 @@ fn other_parameters_go_on_from_a_checkpoint() {
     let change = second.energy_error();
     assert!(change < 1e-12, "{change:e}");
     // A state that violates the constraints of the other model is refused, as in a run.
-    let (short, long) = (Rod { g: 9.81, l: 1.0 }, Rod { g: 9.81, l: 2.0 });
+    let (short, long) = (rod(1.0), rod(2.0));
     let hanging = short.state([1.0, 0.0], [0.0, 0.0]);
     let first = Simulation::new(&short).step(0.02).run(hanging, 0.0..1.0);
     let first = first.expect("a run");

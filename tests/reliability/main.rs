@@ -4,9 +4,11 @@ mod checkpoints;
 mod indices;
 #[path = "../common/largest.rs"]
 mod largest;
+mod models;
 mod steppers;
 
 use largest::larger;
+use models::{Coupled, Damped};
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};
 use tfe::{RunErrorKind, Warning};
@@ -296,16 +298,16 @@ fn a_mass_of_zero_is_told() {
     assert!(told, "{run:?}");
 }
 
-#[dynamics(coordinates(x, y), lagrangian = dot(x)^2/2 + c*dot(x)*dot(y) + dot(y)^2/2 - x^2 - y^2)]
-struct Coupled {
-    c: f64,
+/// A matrix with the eigenvalues 1 − c and 1 + c.
+fn coupled(c: f64) -> Coupled {
+    let (m, k, l) = (1.0, 2.0, 2.0);
+    Coupled { m, c, k, l }
 }
 
-/// A matrix with the eigenvalues 1 − c and 1 + c.
 #[test]
 fn masses_of_both_signs_are_told() {
     let found = |c: f64| {
-        let model = Coupled { c };
+        let model = coupled(c);
         let start = model.state([0.1, 0.2], [0.0, 0.0]);
         let motion = Simulation::new(&model).step(0.01).run(start, 0.0..0.1);
         let warnings = motion.expect("a run").warnings().to_vec();
@@ -373,7 +375,7 @@ fn endless_steps_are_watched() {
         matches!(told[..], [Warning::UnstableStep { .. }]),
         "{told:?}"
     );
-    let coupled = Coupled { c: 1.5 };
+    let coupled = coupled(1.5);
     let indefinite = Simulation::new(&coupled).step(0.01);
     let told = check(&indefinite, coupled.state([0.1, 0.2], [0.0; 2]), 0.0..0.1);
     assert!(matches!(told[..], [Warning::MassIndefinite { .. }]));
@@ -577,14 +579,9 @@ fn endless_steps_below_the_resolution_of_the_time_are_refused() {
 /// iteration.
 #[test]
 fn heavy_linear_models_keep_their_motion() {
-    #[dynamics(coordinates(y), lagrangian = m/2*dot(y)^2 - m*g*y, force(y) = -m*c*dot(y))]
-    struct Falling {
-        m: f64,
-        g: f64,
-        c: f64,
-    }
+    let (k, g, c) = (0.0, 9.81, 0.5);
     for m in [1e-30, 1.0, 6e24, 1e30, 1e60] {
-        let body = Falling { m, g: 9.81, c: 0.5 };
+        let body = Damped { m, k, g, c };
         let run = Simulation::new(&body).element(Element::mixed(6)).step(0.01);
         let motion = run
             .record_every(100)

@@ -1,5 +1,6 @@
 //! What steppers store for a step, and what they refuse.
 
+use super::models::Rod;
 use super::*;
 use tfe::runtime::step::Impulse;
 
@@ -76,22 +77,16 @@ fn kinks_are_looked_for_after_a_failure() {
 #[test]
 fn constraints_of_any_size_count() {
     use tfe::runtime::constrained;
-    #[dynamics(
-        coordinates(x, y),
-        lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
-        constraint(rod) = s*(x^2 + y^2 - 1)
-    )]
-    struct Scaled {
-        g: f64,
-        s: f64,
-    }
-    let scaled = |s: f64| Scaled { g: 9.81, s };
-    let run = |model: &Scaled| {
+    let scaled = |s: f64| {
+        let (g, l) = (9.81, 1.0);
+        Rod { g, l, s }
+    };
+    let run = |model: &Rod| {
         let run = Simulation::new(model).element(Mixed::<4>).step(0.01);
         let motion = run.run(model.state([1.0, 0.0], [0.0, 0.0]), 0.0..1.0);
         motion.map(|motion| motion.last().state())
     };
-    let residual = |model: &Scaled| {
+    let residual = |model: &Rod| {
         let residuals = constrained::residuals(model, 0.0, &[0.6, 0.9], &[0.0, 0.3], 1.0);
         [
             residuals[0].relative_position,
