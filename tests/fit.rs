@@ -340,19 +340,29 @@ fn wide_bounds_do_not_move_the_first_values() {
     }
 }
 
+/// A point mass on a rod.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
+    constraint(rod) = x^2 + y^2 - l^2,
+)]
+struct Rod {
+    m: f64,
+    g: f64,
+    l: f64,
+}
+
+const ROD: Rod = Rod {
+    m: 1.0,
+    g: 9.81,
+    l: 1.0,
+};
+
 /// A fit that ends because all runs nearby fail has not found a minimum: with a rod of another length the initial state
 /// violates the constraint.
 #[test]
 fn runs_that_fail_nearby_are_no_end() {
-    #[dynamics(
-        coordinates(x, y),
-        lagrangian = (dot(x)^2 + dot(y)^2)/2 - 9.81*y,
-        constraint(rod) = x^2 + y^2 - l^2,
-    )]
-    struct Rod {
-        l: f64,
-    }
-    let guess = Rod { l: 1.0 };
+    let guess = ROD;
     let start = guess.state([0.6, -0.8], [0.0, 0.0]);
     let times: Vec<f64> = (1..=20).map(|k| 0.1 * f64::from(k)).collect();
     let measured: Vec<f64> = times.iter().map(|t| 0.5 * (2.8 * t).cos()).collect();
@@ -462,21 +472,7 @@ fn what_cannot_be_fitted_is_told() {
 /// For a model with constraints the initial state must be given; the parameter of a constraint can be fitted.
 #[test]
 fn constrained_models_are_fitted() {
-    #[dynamics(
-        coordinates(x, y),
-        lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y,
-        constraint(rod) = x^2 + y^2 - l^2,
-    )]
-    struct Rod {
-        m: f64,
-        g: f64,
-        l: f64,
-    }
-    let rod = Rod {
-        m: 1.0,
-        g: 9.81,
-        l: 1.0,
-    };
+    let rod = ROD;
     let start = rod.state([0.6, -0.8], [0.0, 0.0]);
     let simulation = Simulation::new(&rod).step(0.02);
     let motion = simulation.run(start, 0.0..2.0).expect("a motion");
