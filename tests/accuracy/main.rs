@@ -3,6 +3,7 @@
 #[path = "../common/largest.rs"]
 mod largest;
 mod refused;
+mod varying_steps;
 
 use largest::larger;
 use tfe::accuracy::Estimated;
