@@ -1,35 +1,11 @@
 //! The calls of the library for models of run-time length: those that work give the same as for a model of fixed size,
 //! and the others are a typed error.
 
+use crate::chain::{CHAIN, Chain, THREE};
 use crate::common::distance;
 use tfe::Warning;
 use tfe::family;
 use tfe::prelude::*;
-
-#[dynamics(
-    coordinates(q[n]),
-    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1] - q[i])^2/2 + a/4*(q[i+1] - q[i])^4) - q[0]^2/2,
-    output(first) = q[0],
-    output(power) = q[0]*dot(q[0]),
-)]
-struct Chain {
-    n: usize,
-    a: f64,
-}
-
-/// The same three masses with fixed size.
-#[dynamics(
-    coordinates(x, y, z),
-    lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - (y - x)^2/2 - a/4*(y - x)^4 - (z - y)^2/2 - a/4*(z - y)^4 - x^2/2,
-    output(first) = x,
-    output(power) = x*dot(x),
-)]
-struct Three {
-    a: f64,
-}
-
-const CHAIN: Chain = Chain { n: 3, a: 0.5 };
-const THREE: Three = Three { a: 0.5 };
 
 fn start() -> family::FamilyState {
     CHAIN.state([1.0, -0.5, 0.25], [0.0, 0.5, 0.0])

@@ -1,6 +1,8 @@
 //! Runs of models of run-time length that continue from where others ended.
 
 use crate::common::distance;
+#[cfg(feature = "sparse")]
+use crate::rods::Rods;
 use tfe::error::RunErrorKind;
 use tfe::family::{self, FamilyState};
 use tfe::prelude::*;
@@ -85,20 +87,9 @@ fn halves_of_stiff_runs() {
 }
 
 #[cfg(feature = "sparse")]
-#[dynamics(
-    coordinates(x[n], y[n]),
-    lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
-    constraint(first) = x[0]^2 + y[0]^2 - 1,
-    constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - 1,
-)]
-struct Rods {
-    n: usize,
-}
-
-#[cfg(feature = "sparse")]
 #[test]
 fn halves_of_constrained_runs() {
-    let rods = Rods { n: 4 };
+    let rods = Rods::of_unit_length(4);
     let start = FamilyState {
         q: vec![1.0, 2.0, 3.0, 4.0, 0.0, 0.0, 0.0, 0.0],
         p: vec![0.0; 8],

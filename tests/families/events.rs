@@ -1,37 +1,15 @@
 //! Events of models of run-time length, compared with those of the same model of fixed size.
 
+use crate::chain::{CHAIN, Chain, THREE, Three};
 use crate::common::distance;
+#[cfg(feature = "sparse")]
+use crate::rods::Rods;
 use std::error::Error;
 use tfe::error::RunErrorKind;
 use tfe::family;
 use tfe::prelude::*;
 
-/// Masses on a line between walls, joined to their neighbours.
-#[dynamics(
-    coordinates(q[n]),
-    lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1] - q[i])^2/2 + a/4*(q[i+1] - q[i])^4) - q[0]^2/2,
-    event(first) = q[0],
-    event(wall[i in 0..n]) = 0.8 - q[i],
-    output(speed) = dot(q[0]),
-)]
-struct Chain {
-    n: usize,
-    a: f64,
-}
-
-/// The same three masses with fixed size.
-#[dynamics(
-    coordinates(x, y, z),
-    lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - (y - x)^2/2 - a/4*(y - x)^4 - (z - y)^2/2 - a/4*(z - y)^4 - x^2/2,
-    event(first) = x,
-    event(wall) = 0.8 - z,
-    output(speed) = dot(x),
-)]
-struct Three {
-    a: f64,
-}
-
-/// The same as Hamiltonians.
+/// The chain as a Hamiltonian.
 #[dynamics(
     coordinates(q[n]),
     momenta(p[n]),
@@ -43,8 +21,6 @@ struct Momenta {
     a: f64,
 }
 
-const CHAIN: Chain = Chain { n: 3, a: 0.5 };
-const THREE: Three = Three { a: 0.5 };
 const Q: [f64; 3] = [0.5, -0.5, 0.25];
 const V: [f64; 3] = [0.0, 0.5, 1.0];
 
@@ -212,7 +188,7 @@ fn what_cannot_be_is_a_typed_error() {
         error.kind().clone()
     };
     let unknown = kind(long().on("wall[3]", Crossing::Either, |_| Act::Stop));
-    let known = ["first", "wall[0]", "wall[1]", "wall[2]", "speed"];
+    let known = ["first", "wall[0]", "wall[1]", "wall[2]", "speed", "power"];
     assert_eq!(
         unknown,
         RunErrorKind::NoEvent {
@@ -255,16 +231,6 @@ fn what_cannot_be_is_a_typed_error() {
 #[test]
 fn impacts_along_constraints() -> Result<(), Box<dyn Error>> {
     #[dynamics(
-        coordinates(x[n], y[n]),
-        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
-        constraint(top) = x[0]^2 + y[0]^2 - 1,
-        constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - 1,
-        event(wall) = 1 - x[n-1],
-    )]
-    struct Rods {
-        n: usize,
-    }
-    #[dynamics(
         coordinates(a, b),
         let x = sin(a) + sin(b),
         let y = -cos(a) - cos(b),
@@ -272,7 +238,7 @@ fn impacts_along_constraints() -> Result<(), Box<dyn Error>> {
         event(wall) = 1 - x,
     )]
     struct Angles;
-    let rods = Rods { n: 2 };
+    let rods = Rods::of_unit_length(2);
     let (a, b, u, w): (f64, f64, f64, f64) = (0.0, -0.5, 1.5, 2.5);
     let (x, y) = ([a.sin(), a.sin() + b.sin()], [-a.cos(), -a.cos() - b.cos()]);
     let (vx, vy) = (

@@ -9,9 +9,9 @@ use tfe::prelude::*;
     coordinates(q[n]),
     lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + a/4*(q[i+1]-q[i])^4),
 )]
-struct Chain {
-    n: usize,
-    a: f64,
+pub struct Chain {
+    pub n: usize,
+    pub a: f64,
 }
 
 #[dynamics(

@@ -1,5 +1,6 @@
 //! Lists of indices: networks known at run time only.
 
+use crate::impulses::Chain;
 use crate::kernels::Dense;
 use tfe::RunErrorKind;
 use tfe::family::{self, Block, Gradient, Model as _};
@@ -103,13 +104,6 @@ fn second_derivatives_are_those_of_the_first() {
 fn a_listed_chain_moves_like_a_chain() {
     #[dynamics(
         coordinates(q[n]),
-        lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + (q[i+1]-q[i])^4/4),
-    )]
-    struct Chain {
-        n: usize,
-    }
-    #[dynamics(
-        coordinates(q[n]),
         lagrangian = sum(i in 0..n, dot(q[i])^2/2)
             - sum(b in 0..bonds, (q[end[b]]-q[begin[b]])^2/2 + (q[end[b]]-q[begin[b]])^4/4),
     )]
@@ -130,7 +124,7 @@ fn a_listed_chain_moves_like_a_chain() {
         begin,
         end,
     };
-    let chain = Chain { n };
+    let chain = Chain { n, a: 1.0 };
     let q: Vec<f64> = (0..n).map(|i| (0.4 * i as f64).sin()).collect();
     let v = vec![0.0; n];
     let one = Simulation::new(&chain).step(0.05);

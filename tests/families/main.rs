@@ -13,6 +13,7 @@ mod duals;
 mod lengths;
 
 mod calls;
+mod chain;
 mod checkpoints;
 #[cfg(feature = "sparse")]
 mod constrained;
@@ -34,6 +35,7 @@ mod motions;
 mod outputs;
 #[cfg(feature = "sparse")]
 mod rates;
+mod rods;
 #[cfg(feature = "sparse")]
 mod sensitive;
 #[cfg(feature = "sparse")]

@@ -83,8 +83,8 @@ fn a_chain_moves_as_the_same_model_of_fixed_size() {
     coordinates(q[n]), momenta(p[n]),
     hamiltonian = sum(i in 0..n, p[i]^2/2) + sum(i in 0..n-1, exp(q[i]-q[i+1])),
 )]
-struct Toda {
-    n: usize,
+pub struct Toda {
+    pub n: usize,
 }
 
 /// Steps of very different lengths: an iteration starts from the polynomial of the previous element, whose

@@ -2,6 +2,7 @@
 
 mod constrained;
 
+use crate::motions::Toda;
 use std::time::Duration;
 use tfe::RunErrorKind;
 use tfe::family::{self, FamilyState};
@@ -34,15 +35,6 @@ struct ChainOfFour {
     m: [f64; 4],
     a: f64,
     b: f64,
-}
-
-/// A chain as a Hamiltonian.
-#[dynamics(
-    coordinates(q[n]), momenta(p[n]),
-    hamiltonian = sum(i in 0..n, p[i]^2/2) + sum(i in 0..n-1, exp(q[i]-q[i+1])),
-)]
-struct Toda {
-    n: usize,
 }
 
 const MASSES: [f64; 4] = [1.0, 0.5, 2.0, 1.5];

@@ -2,23 +2,11 @@
 
 #[cfg(feature = "sparse")]
 use super::measure;
+use crate::rods::Rods;
 use tfe::RunErrorKind;
 use tfe::family::FamilyState;
 use tfe::prelude::*;
 use tfe::work_precision::WorkPrecisionError;
-
-/// A chain of rods, hanging from the first one.
-#[dynamics(
-    coordinates(x[n], y[n]),
-    lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - g*y[i]),
-    constraint(first) = x[0]^2 + y[0]^2 - l^2,
-    constraint(rod[i in 0..n-1]) = (x[i+1] - x[i])^2 + (y[i+1] - y[i])^2 - l^2,
-)]
-struct Rods {
-    n: usize,
-    g: f64,
-    l: f64,
-}
 
 /// Straight, at an angle, and at rest.
 fn hanging(rods: &Rods) -> FamilyState {
