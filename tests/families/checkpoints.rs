@@ -82,7 +82,7 @@ fn halves_of_stiff_runs() {
             q: (0..7).map(f64::from).collect(),
             p: vec![0.0; 7],
         };
-        check(&simulation, &start, (10, h));
+        check(&simulation, &start, (6, h));
     }
 }
 

@@ -32,7 +32,7 @@ fn derivatives_of_a_hundred_sites_are_those_of_runs_in_dual_numbers() {
     const SITES: usize = 100;
     let (model, start) = chain(SITES);
     let element = Element::mixed(4);
-    let (steps, h) = (8_u32, 0.05);
+    let (steps, h) = (4_u32, 0.05);
     let length = f64::from(steps) * h;
     let run = Simulation::new(&model).element(element).step(h);
     let s = run.run_sensitive(start.clone(), 0.0..length);
@@ -80,7 +80,7 @@ fn derivatives_of_a_hundred_sites_are_those_of_runs_in_dual_numbers() {
             beside.by_start(column, &found[SITES..], &found[..SITES]);
         }
     }
-    // The rounding errors of eight steps of both.
+    // The rounding errors of four steps of both.
     assert!(beside.off() < 1e-12, "{:.1e}", beside.off());
     assert!(seen.part() < 1e-12, "{:.1e} of {:.1e}", seen.off, seen.size);
 }

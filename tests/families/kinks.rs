@@ -162,7 +162,7 @@ fn elements_keep_their_order_at_every_site() {
     let (with, without) = (cut.energy_error(), across.energy_error());
     assert!(with < 1e-13 && without > 1e-9, "{with:e} {without:e}");
     // Between the nodes as well, on both sides of a kink.
-    let fine = Simulation::new(&beads).element(Mixed::<7>).step(0.005);
+    let fine = Simulation::new(&beads).element(Mixed::<7>).step(0.01);
     let fine = fine.at_kinks(true).run(start(), 0.0..1.0).expect("a run");
     for k in 0..100 {
         let t = 0.01 * f64::from(k) + 0.0037;

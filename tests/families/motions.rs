@@ -155,12 +155,17 @@ fn the_invariants_of_a_toda_chain_stay() {
         .element(Mixed::<8>)
         .step(0.25)
         .record_every(100);
-    let motion = simulation.run(start, 0.0..1000.0).expect("a run");
+    let motion = simulation.run(start, 0.0..250.0).expect("a run");
     let after = lax_eigenvalues(&motion.last().state());
     let change = before.iter().zip(&after).map(|(a, b)| (a - b).abs());
     let change = change.fold(0.0, larger);
-    assert!(change < 1e-10, "{change:e}");
-    assert!(motion.energy_error() < 1e-12, "{:e}", motion.energy_error());
+    // After a thousand steps. By then sites have flown apart: a hundredth of the energy is left between them.
+    assert!(change < 2.5e-11, "{change:e}");
+    assert!(
+        motion.energy_error() < 2.5e-13,
+        "{:e}",
+        motion.energy_error()
+    );
 }
 
 /// Six bodies in space with x, y and z of each, masses as a list, and all pairs.

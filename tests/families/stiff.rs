@@ -178,7 +178,7 @@ struct Cantilever {
     g: f64,
 }
 
-/// Twenty thousand nodes move like two hundred: the same energy, the same tip, and as many factorisations per step.
+/// Two thousand nodes move like two hundred: the same energy, the same tip, and as many factorisations per step.
 #[test]
 fn a_long_cantilever_moves_as_a_short_one() {
     let run = |n: usize| {
@@ -202,7 +202,7 @@ fn a_long_cantilever_moves_as_a_short_one() {
             motion.statistics().factorizations,
         )
     };
-    let (few, many) = (run(200), run(5_000));
+    let (few, many) = (run(200), run(2_000));
     println!("{few:?}, {many:?}");
     // Relative to m g l = 9.81.
     assert!(few.0 < 1e-5 && many.0 < 1e-5, "{few:?}, {many:?}");
