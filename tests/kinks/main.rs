@@ -44,14 +44,15 @@ fn elements_keep_their_order(which: impl Fn(&Scene<'_>) -> bool) {
                 "{name} {element}: order {most:.2}, {errors:?}"
             );
             assert_eq!(runs[3].kinks, fine.kinks, "{name} {element}");
+            // For the smooth scene both runs are the same, as another test shows.
+            if fine.kinks == 0 {
+                continue;
+            }
             let across = (scene.run)(element, steps[3], false);
             assert_eq!(across.kinks, 0);
-            // For the smooth scene both runs are the same; in the others an element across a kink has order one or two.
+            // An element across a kink has order one or two.
             let ratio = apart(&across.end, &fine.end) / errors[3].max(1e-13);
-            assert!(
-                fine.kinks == 0 || ratio > 3.0,
-                "{name} {element}: {ratio:.1}"
-            );
+            assert!(ratio > 3.0, "{name} {element}: {ratio:.1}");
         }
     }
 }
