@@ -1,7 +1,7 @@
 //! The transition operator of a model of run-time length: the derivative of a step.
 
 use crate::common::larger;
-use crate::differences;
+use crate::differences::{difference, difference_over};
 use crate::hybrid::OnCircles;
 use crate::lengths::of_both_lengths;
 use tfe::family::{self, FamilyState};
@@ -135,15 +135,6 @@ fn end<M: family::Model>(
     [state.p, state.q].concat()
 }
 
-/// Differences of fourth order: errors of 1e-12 from truncation, 1e-13 / 1e-3 from rounding.
-fn difference(end: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
-    let d = 1e-3;
-    let ends = [end(d), end(-d), end(2.0 * d), end(-2.0 * d)];
-    (0..ends[0].len())
-        .map(|a| (8.0 * (ends[0][a] - ends[1][a]) - (ends[2][a] - ends[3][a])) / (12.0 * d))
-        .collect()
-}
-
 #[test]
 fn operators_are_derivatives_of_the_step() {
     let (web, _) = webs();
@@ -159,18 +150,19 @@ fn operators_are_derivatives_of_the_step() {
 
 #[track_caller]
 fn check_derivatives<M: family::Model>(model: &M, start: &FamilyState, element: Element) {
+    let by_shift = |end: &dyn Fn(f64) -> Vec<f64>| difference_over(1e-3, end, 0.0);
     let leg = (0.4, 0.2);
     let operator = transition(model, element, start, leg.0, leg.1).expect("an operator");
     let matrix = operator.matrix();
     for k in 0..10 {
-        let by_steps = difference(|d| end(model, element, start, leg, (k, d)));
+        let by_steps = by_shift(&|d| end(model, element, start, leg, (k, d)));
         for (row, by_steps) in by_steps.iter().enumerate() {
             let off = (matrix[(row, k)] - by_steps).abs();
             assert!(off < 1e-9, "{element} ({row}, {k}): {off:e}");
         }
     }
     if !M::FACTS.time_dependent {
-        let by_steps = difference(|d| end(model, element, start, leg, (10, d)));
+        let by_steps = by_shift(&|d| end(model, element, start, leg, (10, d)));
         for (by_length, by_steps) in operator.by_length().iter().zip(&by_steps) {
             assert!((by_length - by_steps).abs() < 1e-9);
         }
@@ -355,7 +347,7 @@ fn derivatives_go_back_across_impulses() {
         let motion = motion.expect("a run");
         [&motion.last().q[..], &motion.last().p].concat()
     };
-    let expected = differences::difference(end, k);
+    let expected = difference(end, k);
     let beads = beads(k);
     let sensitive = run(&beads).run_sensitive(start.clone(), span.clone());
     let found = sensitive.expect("a run").by("k").last();

@@ -70,13 +70,13 @@ fn misuse_is_told() {
     assert!(kind.to_string().contains("set it with `step(h)`"), "{kind}");
 }
 
+#[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u, event(middle) = x)]
+struct Oscillator;
+
 /// If a function panics or returns a number that is not finite, the run ends with an error that says when; what was
 /// recorded before is kept.
 #[test]
 fn functions_that_fail_are_told() {
-    #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u, event(middle) = x)]
-    struct Oscillator;
-
     let start = Oscillator.state([1.0], [0.0]);
     let simulation = Simulation::new(&Oscillator).step(0.1);
     let nan = |t: f64| if t > 2.0 { f64::NAN } else { 0.1 };
@@ -153,9 +153,6 @@ fn functions_that_fail_are_told() {
 /// is as in any other run.
 #[test]
 fn functions_that_panic_at_once_are_told() {
-    #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u, output(force) = u)]
-    struct Oscillator;
-
     let start = Oscillator.state([1.0], [0.0]);
     let simulation = Simulation::new(&Oscillator).step(0.1);
     let panics = |_: f64| -> f64 { panic!("at once") };
@@ -177,15 +174,16 @@ fn functions_that_panic_at_once_are_told() {
 /// Functions are called for times within the span of a run only; outside they may be undefined.
 #[test]
 fn functions_are_not_asked_beyond_the_span() {
+    // Without outputs of the input, which would be asked at nodes.
     #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, input(u), force(x) = u)]
-    struct Oscillator;
+    struct Silent;
 
     let wind = |t: f64| {
         assert!((2.0..=3.0).contains(&t), "no wind at {t}");
         t
     };
-    let start = Oscillator.state([1.0], [0.0]);
-    let run = Simulation::new(&Oscillator).step(0.1).input("u", wind);
+    let start = Silent.state([1.0], [0.0]);
+    let run = Simulation::new(&Silent).step(0.1).input("u", wind);
     run.run(start, 2.0..3.0).expect("a run");
     for step in run.steps(start, 2.0).take(10) {
         step.expect("a step");

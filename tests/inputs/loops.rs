@@ -1,6 +1,6 @@
 //! Control loops.
 
-use crate::{DRIVING, w};
+use crate::{DRIVING, Mass, w};
 use tfe::prelude::*;
 use tfe::{HeldNode, InputError, RunErrorKind};
 
@@ -38,9 +38,6 @@ fn a_loop_holds_what_was_set() {
 /// Feedback laws sampled at their own rates: the same as setting the inputs by hand at these times.
 #[test]
 fn feedback_is_sampled_with_its_own_rate() {
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u, w), force(x) = u + w)]
-    struct Mass;
-
     let start = Mass.state([1.0], [0.3]);
     let hold = || {
         Simulation::new(&Mass)
@@ -85,9 +82,6 @@ fn feedback_is_sampled_with_its_own_rate() {
 /// If an event stops the loop, the outputs of its last node are those at this node.
 #[test]
 fn outputs_of_a_loop_that_is_stopped_are_those_of_its_end() {
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u, event(wall) = 0.75 - x, output(place) = x)]
-    struct Mass;
-
     let mut held = Simulation::new(&Mass)
         .step(0.3)
         .on("wall", Crossing::Falling, |_| Act::Stop)
@@ -106,9 +100,6 @@ fn outputs_of_a_loop_that_is_stopped_are_those_of_its_end() {
 #[test]
 fn feedback_is_sampled_at_late_times() {
     use std::sync::atomic::{AtomicU32, Ordering};
-
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u)]
-    struct Mass;
 
     let asked = AtomicU32::new(0);
     let start = Mass.state([1.0], [0.0]);
@@ -185,11 +176,11 @@ fn outputs_of_a_loop_are_those_of_each_node() {
         output(gain) = k,
         output(pushed) = u,
     )]
-    struct Mass {
+    struct Amplified {
         k: f64,
     }
 
-    let mass = Mass { k: 1.0 };
+    let mass = Amplified { k: 1.0 };
     let mut run = Simulation::new(&mass)
         .step(0.3)
         .on("line", Crossing::Rising, |_| {

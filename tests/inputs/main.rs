@@ -44,6 +44,10 @@ struct Written {
     c: f64,
 }
 
+/// A mass that two inputs push.
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u, w), force(x) = u + w, event(wall) = 0.75 - x, output(place) = x)]
+struct Mass;
+
 /// A Hamiltonian with an input in its kinetic and in its potential energy.
 #[dynamics(
     coordinates(x, y),
@@ -380,9 +384,6 @@ fn parameters_of_driven_models_are_set() {
 /// An input that jumps at the last node acts as before up to there.
 #[test]
 fn given_nodes_may_end_at_a_jump() {
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2, input(u), force(x) = u)]
-    struct Mass;
-
     let motion = Simulation::new(&Mass)
         .element(Radau::<3>)
         .nodes([0.0, 0.5, 1.0])

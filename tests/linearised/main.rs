@@ -9,6 +9,8 @@ mod common;
 mod along;
 mod critical_speed;
 mod derivative;
+#[path = "../common/differences.rs"]
+mod differences;
 mod stiff;
 mod top;
 mod warnings;

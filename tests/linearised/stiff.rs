@@ -26,9 +26,9 @@ const IN_THE_BUBBLE: f64 = 3.3;
     coordinates(r, theta),
     lagrangian = (dot(r)^2 + r^2*dot(theta)^2)/2 + g*r*cos(theta) - k/2*(r - 1)^2,
 )]
-struct ElasticPendulum {
-    g: f64,
-    k: f64,
+pub(crate) struct ElasticPendulum {
+    pub(crate) g: f64,
+    pub(crate) k: f64,
 }
 
 /// g/k is a power of two, so that the equilibrium is exact to the last bit.

@@ -1,5 +1,7 @@
 //! The warnings of a run whose steps make the method unstable.
 
+use crate::along::Inverted;
+use crate::stiff::ElasticPendulum;
 use tfe::prelude::*;
 use tfe::{Rule, RunError, Warning};
 
@@ -112,8 +114,6 @@ fn backwards_in_time_too() {
 
 #[test]
 fn a_model_that_grows_itself_is_no_warning() {
-    #[dynamics(coordinates(theta), lagrangian = dot(theta)^2/2 - cos(theta))]
-    struct Inverted {}
     let model = Inverted {};
     for nodes in 2..=5 {
         for element in [Element::primal(nodes), Element::primal(nodes).lobatto()] {
@@ -127,16 +127,6 @@ fn a_model_that_grows_itself_is_no_warning() {
             }
         }
     }
-}
-
-/// A mass on a spring that swings.
-#[dynamics(
-    coordinates(r, theta),
-    lagrangian = (dot(r)^2 + r^2*dot(theta)^2)/2 + g*r*cos(theta) - k/2*(r - 1)^2,
-)]
-struct ElasticPendulum {
-    g: f64,
-    k: f64,
 }
 
 #[test]
