@@ -1,6 +1,7 @@
 //! Gradients of losses, which are computed backwards, beside those composed of forward derivatives, for both kinds of
 //! length.
 
+use std::ops::Range;
 use tfe::length::Length;
 use tfe::sensitivity::{Loss, LossGradient, Sensitive};
 
@@ -22,6 +23,42 @@ pub fn of_all<'l, const N: usize, L: Length<N>>(output: &str) -> Loss<'l, N, L> 
     })
     .and(Loss::squares(output, TIMES, VALUES))
     .and(Loss::output_at_end(output))
+}
+
+/// A loss of a span: of the end, with an output, of the output at the start, inside, twice at one time and at the end,
+/// and of its integral.
+pub fn of_span<'l, const N: usize, L: Length<N>>(
+    output: &str,
+    span: &Range<f64>,
+) -> Loss<'l, N, L> {
+    let length = span.end - span.start;
+    let times = [0.0, 0.31, 0.5, 0.5, 1.0].map(|part| span.start + part * length);
+    Loss::of_end(|q, p, v| q[0].sin() + p[q.len() - 1] * v[0])
+        .and(Loss::squares(output, times, [0.2, -0.1, 0.4, 0.1, 0.3]).times(0.7))
+        .and(Loss::output_at_end(output))
+        .and(Loss::integral(output))
+}
+
+/// The gradient of a loss by all parameters and by the initial state, and the loss, as one row.
+pub fn row<const N: usize, L: Length<N>>(
+    (value, gradient): &(f64, LossGradient<N, L>),
+) -> Vec<f64> {
+    let by_start = gradient.by_start();
+    let (q, p) = L::parts(&by_start);
+    [gradient.by_parameters(), q.as_ref(), p.as_ref(), &[*value]].concat()
+}
+
+/// Asserts that two such rows agree up to rounding errors.
+#[track_caller]
+pub fn compare_rows(found: &[f64], expected: &[f64], what: &str) {
+    assert_eq!(found.len(), expected.len());
+    let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(
+            (found - expected).abs() < 1e-12 * size,
+            "{what}: {found} instead of {expected}"
+        );
+    }
 }
 
 /// What was found and what is expected.

@@ -2,7 +2,7 @@
 //! derivatives.
 
 use super::sensitive::{LongPendula, pair, pendula};
-use crate::composed::{self, TIMES};
+use crate::composed::{self, TIMES, compare_rows};
 use crate::lengths::{Seen, of_heap};
 use tfe::RunErrorKind;
 use tfe::family::{FamilyState, Loss, Model, RunError};
@@ -221,10 +221,8 @@ fn runs_that_keep_some_nodes_have_the_gradients_of_those_that_keep_all() {
         span: std::ops::Range<f64>,
         loss: &Loss<'_>,
     ) -> Vec<f64> {
-        let (value, gradient) = run.gradient(start.clone(), span, loss).expect("a gradient");
-        let by_start = gradient.by_start();
-        let all = gradient.by_parameters().iter().chain(&by_start.q);
-        all.chain(&by_start.p).chain([&value]).copied().collect()
+        let found = run.gradient(start.clone(), span, loss);
+        composed::row(&found.expect("a gradient"))
     }
     let (model, start) = chain(12);
     let mut kick = vec![0.0; 12];
@@ -236,15 +234,10 @@ fn runs_that_keep_some_nodes_have_the_gradients_of_those_that_keep_all() {
         (Element::mixed(3), 1.0..0.0),
         (Element::mixed(3), 0.5..0.5),
     ] {
-        let length = span.end - span.start;
-        let times = [0.0, 0.31, 0.5, 0.5, 1.0].map(|part| span.start + part * length);
-        let loss = Loss::of_end(|q, p, v| q[0].sin() + p[11] * v[0])
-            .and(Loss::squares("middle", times, [0.2, -0.1, 0.4, 0.1, 0.3]).times(0.7))
-            .and(Loss::output_at_end("middle"))
-            .and(Loss::integral("middle"));
+        let loss = composed::of_span("middle", &span);
         // One impulse inside, and one at a node that is stored.
         let run = Simulation::new(&model).element(element).step(0.05);
-        let run = match length == 0.0 {
+        let run = match span.start == span.end {
             true => run,
             false => {
                 let kicked = run.impulse(0.42, kick.clone());
@@ -252,14 +245,10 @@ fn runs_that_keep_some_nodes_have_the_gradients_of_those_that_keep_all() {
             }
         };
         let expected = all_of(&run, &start, span.clone(), &loss);
-        let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
         for every in [2, 7, usize::MAX] {
             let run = run.clone().record_every(every);
             let found = all_of(&run, &start, span.clone(), &loss);
-            for (found, expected) in found.iter().zip(&expected) {
-                let off = (found - expected).abs();
-                assert!(off < 1e-12 * size, "{element}, every {every}: {off:.1e}");
-            }
+            compare_rows(&found, &expected, &format!("{element}, every {every}"));
         }
     }
     let loss = Loss::output_at_end("middle");

@@ -101,7 +101,7 @@ fn wave(n: usize) -> Vec<f64> {
 }
 
 #[track_caller]
-fn assert_alike(a: &[f64], b: &[f64], tolerance: f64) {
+pub(super) fn assert_alike(a: &[f64], b: &[f64], tolerance: f64) {
     assert_eq!(a.len(), b.len());
     for (a, b) in a.iter().zip(b) {
         assert!((a - b).abs() <= tolerance, "{a} beside {b}");

@@ -1,5 +1,6 @@
 //! Models of run-time length whose steps are cut at kinks and jumps of forces.
 
+use super::inputs::assert_alike;
 use crate::common::larger;
 use tfe::prelude::*;
 use tfe::runtime::StepError;
@@ -70,14 +71,6 @@ struct HalfSprings {
 )]
 struct ThreeHalfSprings {
     b: f64,
-}
-
-#[track_caller]
-fn assert_alike(a: &[f64], b: &[f64], tolerance: f64) {
-    assert_eq!(a.len(), b.len());
-    for (a, b) in a.iter().zip(b) {
-        assert!((a - b).abs() <= tolerance, "{a} beside {b}");
-    }
 }
 
 /// The motion of a model of run-time length is that of the model of fixed size, with as many crossings. Elements with

@@ -268,13 +268,7 @@ fn gradients_of_runs_that_keep_some_nodes_are_those_of_runs_that_keep_all() {
         span: std::ops::Range<f64>,
         output: &str,
     ) {
-        // At the start, inside, twice at the same time, and at the end.
-        let length = span.end - span.start;
-        let times = [0.0, 0.31, 0.5, 0.5, 1.0].map(|part| span.start + part * length);
-        let loss = Loss::at_end(|node: &Node<N>| node.q[0].sin() + node.p[N - 1] * node.v[0])
-            .and(Loss::squares(output, times, [0.2, -0.1, 0.4, 0.1, 0.3]).times(0.7))
-            .and(Loss::output_at_end(output))
-            .and(Loss::integral(output));
+        let loss = composed::of_span(output, &span);
         let all = gradient_of(simulation, start, span.clone(), &loss);
         for every in [2, 7, usize::MAX] {
             let some = simulation.clone().record_every(every);

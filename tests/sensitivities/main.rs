@@ -15,6 +15,7 @@ mod inside;
 mod quaternions;
 mod second;
 
+use composed::{compare_rows, row};
 use differences::difference;
 use tfe::prelude::*;
 use tfe::runtime::step::{Control, Stepper};
@@ -40,27 +41,7 @@ fn gradient_of<M: Model<N> + Sync, const N: usize>(
     span: std::ops::Range<f64>,
     loss: &Loss<'_, N>,
 ) -> Vec<f64> {
-    let (value, gradient) = simulation.gradient(start, span, loss).expect("a gradient");
-    let by_start = gradient.by_start();
-    let numbers = gradient.by_parameters().iter();
-    let numbers = numbers
-        .chain(&by_start.q)
-        .chain(&by_start.p)
-        .chain([&value]);
-    numbers.copied().collect()
-}
-
-/// Asserts that two such rows agree up to rounding errors.
-#[track_caller]
-fn compare_rows(found: &[f64], expected: &[f64], what: &str) {
-    assert_eq!(found.len(), expected.len());
-    let size = expected.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-    for (found, expected) in found.iter().zip(expected) {
-        assert!(
-            (found - expected).abs() < 1e-12 * size,
-            "{what}: {found} instead of {expected}"
-        );
-    }
+    row(&simulation.gradient(start, span, loss).expect("a gradient"))
 }
 
 /// Compares all derivatives of a run with differences; `allowed` is relative to the largest derivative by the same
