@@ -28,6 +28,15 @@ pub fn of_heap<const N: usize>(state: &State<N>) -> FamilyState {
     }
 }
 
+/// The largest difference of the numbers of two states.
+#[track_caller]
+pub fn states_apart<const N: usize>(long: &FamilyState, fixed: &State<N>) -> f64 {
+    assert_eq!((long.q.len(), long.p.len()), (N, N));
+    let places = long.q.iter().zip(&fixed.q);
+    let pairs = places.chain(long.p.iter().zip(&fixed.p));
+    pairs.fold(0.0, |most, (a, b)| larger(most, (a - b).abs()))
+}
+
 /// The largest difference of numbers from those expected, and the largest of the latter.
 pub struct Seen {
     pub off: f64,

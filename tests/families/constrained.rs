@@ -1,6 +1,7 @@
 //! Motions of models of run-time length with constraints.
 
 use crate::common::larger;
+use crate::lengths::of_both_lengths;
 use tfe::error::RunErrorKind;
 use tfe::prelude::*;
 use tfe::runtime::ConstraintError;
@@ -47,21 +48,15 @@ struct FourRods {
 
 const MASSES: [f64; 4] = [1.0, 0.5, 2.0, 1.5];
 const LENGTHS: [f64; 3] = [0.8, 1.0, 0.6];
-const G: f64 = 9.81;
-const K: f64 = 0.7;
-const C: f64 = 0.1;
 const A: f64 = 0.2;
 
+fn both() -> (Rods, FourRods) {
+    let (m, l, g, k, c, a) = (MASSES, LENGTHS, 9.81, 0.7, 0.1, A);
+    of_both_lengths!(Rods(4), FourRods: m, l, g, k, c, a)
+}
+
 fn rods() -> Rods {
-    Rods {
-        n: 4,
-        m: MASSES.to_vec(),
-        l: LENGTHS.to_vec(),
-        g: G,
-        k: K,
-        c: C,
-        a: A,
-    }
+    both().0
 }
 
 /// A bent chain; the support moves with `a` to the right, and the chain with it.
@@ -80,15 +75,7 @@ fn start() -> ([f64; 8], [f64; 8]) {
 
 #[test]
 fn rods_move_as_those_of_fixed_size() {
-    let four = FourRods {
-        m: MASSES,
-        l: LENGTHS,
-        g: G,
-        k: K,
-        c: C,
-        a: A,
-    };
-    let (long, (q, v)) = (rods(), start());
+    let ((long, four), (q, v)) = (both(), start());
     for element in [
         Element::mixed(2),
         Element::mixed(3),

@@ -2,6 +2,7 @@
 
 use crate::chain::{CHAIN, Chain, THREE, Three};
 use crate::common::distance;
+use crate::lengths::of_both_lengths;
 #[cfg(feature = "sparse")]
 use crate::rods::Rods;
 use std::error::Error;
@@ -303,15 +304,8 @@ struct ThreeSprings {
 /// A spring yields at one event; at another one masses change, while velocities remain.
 #[test]
 fn parameters_are_set_at_events() -> Result<(), Box<dyn Error>> {
-    let springs = Springs {
-        n: 3,
-        m: 1.2,
-        k: vec![2.0, 3.0],
-    };
-    let three = ThreeSprings {
-        m: 1.2,
-        k: [2.0, 3.0],
-    };
+    let (m, k) = (1.2, [2.0, 3.0]);
+    let (springs, three) = of_both_lengths!(Springs(3), ThreeSprings: m, k);
     let span = || 0.0..30.0;
     for every in [1, 7] {
         let long = Simulation::new(&springs)

@@ -8,7 +8,6 @@ mod composed;
 #[cfg(feature = "sparse")]
 #[path = "../common/duals.rs"]
 mod duals;
-#[cfg(feature = "sparse")]
 #[path = "../common/lengths.rs"]
 mod lengths;
 

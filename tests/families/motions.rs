@@ -1,6 +1,7 @@
 //! Motions of models of run-time length compared with models of fixed size and with their known properties.
 
 use crate::common::{larger, list, number, reference};
+use crate::lengths::{of_both_lengths, states_apart};
 use nalgebra::DMatrix;
 use tfe::Warning;
 use tfe::family::FamilyState;
@@ -51,15 +52,9 @@ fn a_chain_moves_as_the_same_model_of_fixed_size() {
                 .expect("a run");
             assert_eq!(family.states().len(), fixed.states().len());
             for (one, other) in family.states().iter().zip(fixed.states()) {
-                for j in 0..5 {
-                    // About a hundred rounding errors of numbers of order one.
-                    let (q, p) = (one.q[j] - other.q[j], one.p[j] - other.p[j]);
-                    assert!(
-                        q.abs() < 1e-13 && p.abs() < 1e-13,
-                        "{element} t = {}: {q:e} {p:e}",
-                        one.t
-                    );
-                }
+                // About a hundred rounding errors of numbers of order one.
+                let off = states_apart(&one.state(), &other.state());
+                assert!(off < 1e-13, "{element} t = {}: {off:e}", one.t);
             }
             assert_eq!(family.states().len(), fixed.states().len());
             assert!((family.energy_error() - fixed.energy_error()).abs() < 1e-14);
@@ -68,11 +63,8 @@ fn a_chain_moves_as_the_same_model_of_fixed_size() {
                 family.at(time).expect("inside"),
                 fixed.at(time).expect("inside"),
             );
-            for j in 0..5 {
-                assert!(
-                    (one.q[j] - other.q[j]).abs() < 1e-12 && (one.p[j] - other.p[j]).abs() < 1e-12
-                );
-            }
+            let off = states_apart(&one.state(), &other.state());
+            assert!(off < 1e-12, "{element}: {off:e}");
         }
     }
 }
@@ -293,14 +285,7 @@ struct DrivenOfFixedSize {
 #[test]
 fn forces_by_site_and_a_coordinate_of_its_own() {
     let (m, c, k, f) = ([1.0, 2.0, 0.5], [0.1, 0.2, 0.05], 0.7, 0.4);
-    let family = Driven {
-        n: 3,
-        m: m.to_vec(),
-        c: c.to_vec(),
-        k,
-        f,
-    };
-    let fixed = DrivenOfFixedSize { m, c, k, f };
+    let (family, fixed) = of_both_lengths!(Driven(3), DrivenOfFixedSize: m, c, k, f);
     let (q, v) = ([0.3, 0.1, -0.4, 0.2], [0.0, 0.5, -0.1, 0.3]);
     for element in [Element::mixed(4), Element::mixed(9), Element::radau(3)] {
         let start = family.state(q, v);
@@ -308,13 +293,8 @@ fn forces_by_site_and_a_coordinate_of_its_own() {
         let one = run.run(start, 0.0..5.0).expect("a run");
         let run = Simulation::new(&fixed).element(element).step(0.05);
         let other = run.run(fixed.state(q, v), 0.0..5.0).expect("a run");
-        for a in 0..4 {
-            let (q, p) = (
-                one.last().q[a] - other.last().q[a],
-                one.last().p[a] - other.last().p[a],
-            );
-            assert!(q.abs() < 1e-13 && p.abs() < 1e-13, "{element}: {q:e} {p:e}");
-        }
+        let off = states_apart(&one.last().state(), &other.last().state());
+        assert!(off < 1e-13, "{element}: {off:e}");
     }
 }
 

@@ -1,5 +1,6 @@
 //! Stiff models of run-time length by Newton's method with a sparse factorisation.
 
+use crate::lengths::of_both_lengths;
 use tfe::family::FamilyState;
 use tfe::prelude::*;
 
@@ -56,14 +57,8 @@ fn stiff_rods_move_as_those_of_fixed_size() {
         (1e6, Solve::Newton, 0.05),
     ] {
         let (b, c) = (0.3, 0.2);
-        let long = Rod {
-            n: 4,
-            m: MASSES.to_vec(),
-            b,
-            c,
-            k,
-        };
-        let four = RodOfFour { m: MASSES, b, c, k };
+        let m = MASSES;
+        let (long, four) = of_both_lengths!(Rod(4), RodOfFour: m, b, c, k);
         let (q, v) = ([0.5, 0.5, 0.5, 0.501], [0.1; 4]);
         for element in [
             Element::mixed(3),

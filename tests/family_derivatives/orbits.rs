@@ -2,7 +2,7 @@
 
 use crate::common::larger;
 use crate::differences::difference;
-use crate::lengths::of_both_lengths;
+use crate::lengths::{of_both_lengths, states_apart};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::{PI, TAU};
 use tfe::AssemblyError;
@@ -89,15 +89,6 @@ struct Chain {
 )]
 struct Six {
     b: f64,
-}
-
-/// The largest difference of the numbers of two states.
-#[track_caller]
-fn states_apart<const N: usize>(long: &FamilyState, fixed: &State<N>) -> f64 {
-    assert_eq!((long.q.len(), long.p.len()), (N, N));
-    let places = long.q.iter().zip(&fixed.q);
-    let pairs = places.chain(long.p.iter().zip(&fixed.p));
-    pairs.fold(0.0, |most, (a, b)| larger(most, (a - b).abs()))
 }
 
 /// The distance of each number from the nearest of the others.
