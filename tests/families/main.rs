@@ -42,4 +42,5 @@ mod stiff;
 mod strides;
 #[cfg(feature = "sparse")]
 mod table;
+mod units;
 mod work_precision;

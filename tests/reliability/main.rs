@@ -6,6 +6,7 @@ mod indices;
 mod largest;
 mod models;
 mod steppers;
+mod units;
 
 use largest::larger;
 use models::{Coupled, Damped};

@@ -32,6 +32,9 @@ pub(crate) trait Equations {
     /// The size of an increment of x, relative to the state.
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment;
 
+    /// The same relative to the size of each coordinate; `None` where none is small beside the largest one.
+    fn measure_own(&self, x: &[f64], step: &[f64]) -> Option<f64>;
+
     /// After Newton's method, updates to the final x what the end of the step depends on.
     fn finish(&mut self, x: &[f64], scratch: &mut [f64]) -> Result<(), StepError>;
 

@@ -41,6 +41,7 @@ mod registers;
 mod rows;
 mod running;
 mod scale;
+mod settling;
 mod space;
 #[cfg(feature = "sparse")]
 mod start;

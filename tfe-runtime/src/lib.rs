@@ -79,6 +79,7 @@ mod tableau;
 mod tape;
 pub mod transition;
 mod trigonometry;
+mod unlike;
 mod velocity_form;
 #[cfg(feature = "alloc")]
 pub mod weak_form;

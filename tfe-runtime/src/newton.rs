@@ -114,6 +114,9 @@ pub(crate) struct Monitor {
     /// The smallest increment so far; `idle` counts the iterations since it was last halved.
     best: f64,
     idle: u32,
+    /// Whether increments are those relative to the size of each coordinate, and the last of these.
+    settles: bool,
+    own: f64,
 }
 
 /// One accidentally small increment must not end an iteration: the convergence estimate uses at least this fraction of
@@ -161,6 +164,8 @@ impl Monitor {
             noise: 0,
             best: f64::INFINITY,
             idle: 0,
+            settles: false,
+            own: f64::INFINITY,
         }
     }
 
@@ -266,6 +271,71 @@ impl Monitor {
         })
     }
 
+    /// Judges an increment, and `own`, the same relative to the size of each coordinate, where one is small beside the
+    /// largest: once increments relative to the largest coordinate have converged, only these count.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`].
+    #[inline(always)]
+    pub(crate) fn judge_each(
+        &mut self,
+        increment: Increment,
+        own: Option<f64>,
+    ) -> Result<Verdict, StepError> {
+        match own {
+            Some(own) => self.judge_own(increment, own),
+            None => self.judge(increment),
+        }
+    }
+
+    #[inline(never)]
+    fn judge_own(&mut self, increment: Increment, own: f64) -> Result<Verdict, StepError> {
+        if self.settles || matches!(self.judge(increment)?, Verdict::Converged) {
+            return self.settle(own);
+        }
+        self.own = own;
+        Ok(Verdict::GoOn)
+    }
+
+    /// Declares that from now on increments are those relative to the size of each coordinate.
+    pub(crate) fn begin_to_settle(&mut self) {
+        // Nothing is known of them yet.
+        (self.settles, self.last) = (true, 1.0);
+    }
+
+    /// Whether they are.
+    pub(crate) fn settles(&self) -> bool {
+        self.settles
+    }
+
+    /// Judges an increment relative to the size of each coordinate. Rounding errors of larger coordinates may keep it above
+    /// the tolerance: the iteration ends where such increments do not shrink.
+    ///
+    /// # Errors
+    /// [`StepError::NonFinite`].
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn settle(&mut self, own: f64) -> Result<Verdict, StepError> {
+        /// Increments of an iteration that contracts, even if slowly.
+        const SHRINKS: f64 = 0.9;
+
+        let before = core::mem::replace(&mut self.own, own);
+        (self.settles, self.last) = (true, own);
+        if !(own < f64::INFINITY) {
+            return Err(StepError::NonFinite);
+        }
+        let goes_on = if before == f64::INFINITY {
+            own > self.tolerance
+        } else {
+            own < SHRINKS * before && own * own > self.tolerance * (before - own)
+        };
+        Ok(if goes_on {
+            Verdict::GoOn
+        } else {
+            Verdict::Converged
+        })
+    }
+
     /// Records the rate of the last increment if it is evidence about the root.
     #[inline(always)]
     fn see_rate(&mut self) {
@@ -284,7 +354,7 @@ impl Monitor {
     /// does not end the iteration.
     #[cfg(feature = "sparse")]
     pub(crate) fn is_noise(&mut self, fresh: bool) -> bool {
-        let idle = fresh && self.rate > 0.5 && self.last <= STIFF_ROUND_OFF;
+        let idle = fresh && self.rate > 0.5 && self.last <= STIFF_ROUND_OFF && !self.settles;
         self.noise = if idle { self.noise + 1 } else { 0 };
         self.noise >= 2
     }
@@ -359,16 +429,21 @@ where
         statistics.iterations += 1;
         statistics.fixed_point_iterations += 1;
         let increment = equations.measure(unknowns, step);
-        let verdict = monitor.judge(increment)?;
+        let own_increment = (!control.is_rough())
+            .then(|| equations.measure_own(unknowns, step))
+            .flatten();
+        let verdict = monitor.judge_each(increment, own_increment)?;
         equations.statistics().contraction = Contraction::of(monitor.rate());
         if let Verdict::Converged = verdict {
             return monitor.evidence(yielding).check(control.solve);
         }
         // The initial guess is accurate to a few digits, so that one evaluation of the mass matrices usually suffices.
         refresh = monitor.rate() > 0.1;
-        if (yielding && iteration >= 2 && monitor.is_hopeless(most - iteration))
-            || monitor.is_stuck()
-        {
+        let is_hopeless = yielding
+            && iteration >= 2
+            && !monitor.settles()
+            && monitor.is_hopeless(most - iteration);
+        if is_hopeless || monitor.is_stuck() {
             iterations = iteration + 1;
             break;
         }
@@ -451,7 +526,10 @@ pub(crate) fn newton(
         let increment = equations.measure(unknowns, step);
         own |= fresh;
         evidence.see(increment, own);
-        let verdict = monitor.judge(increment)?;
+        let own_increment = (!control.is_rough())
+            .then(|| equations.measure_own(unknowns, step))
+            .flatten();
+        let verdict = monitor.judge_each(increment, own_increment)?;
         // Linear equations are solved once; a second solution removes the rounding error.
         let refined = linear && iteration > 0 && increment.relative <= ROUND_OFF;
         if refined || matches!(verdict, Verdict::Converged) || monitor.is_rounding(fresh) {
@@ -481,6 +559,20 @@ pub(crate) fn newton(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Rounding errors of larger coordinates do not shrink.
+    #[test]
+    fn small_coordinates_settle_while_increments_shrink() {
+        let end_of = |sequence: &[f64]| {
+            let mut monitor = Monitor::new(1e-17);
+            let ends = |own: &f64| matches!(monitor.settle(*own), Ok(Verdict::Converged));
+            sequence.iter().position(ends)
+        };
+        assert_eq!(end_of(&[1e-6, 1e-9, 1e-12, 1e-15, 1e-18]), Some(3));
+        assert_eq!(end_of(&[1e-6, 1e-9, 0.95e-9]), Some(2));
+        assert_eq!(end_of(&[0.0]), Some(0));
+        assert_eq!(end_of(&[1e-6, f64::NAN, f64::NAN]), None);
+    }
 
     /// The cheap way out decides as the power itself does.
     #[test]

@@ -12,6 +12,7 @@ use crate::error::StepError;
 use crate::model::{First, Model, Second};
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
+use crate::unlike::{by_coordinate, larger_own, own_increment};
 
 pub(crate) struct PhaseForm<'a, M, const N: usize> {
     pub(crate) model: &'a M,
@@ -233,6 +234,26 @@ where
             momentum.max(position)
         };
         Increment { relative, position }
+    }
+
+    fn measure_own(&self, x: &[f64], step: &[f64]) -> Option<f64> {
+        if const { N == 1 } {
+            return None;
+        }
+        let half = x.len() / 2;
+        let Span { h, start, .. } = self.span;
+        let own = |start: &[f64; N], rates: &[f64], step: &[f64]| {
+            let (mut sizes, mut increments) = (by_coordinate::<N>(rates), by_coordinate::<N>(step));
+            for a in 0..N {
+                sizes[a] = start[a].abs().max(h.abs() * sizes[a]);
+                increments[a] *= h.abs();
+            }
+            own_increment::<M, N>(&sizes, &increments, 0.0)
+        };
+        larger_own(
+            own(&start.q, &x[half..], &step[half..]),
+            own(&start.p, &x[..half], &step[..half]),
+        )
     }
 
     fn finish(&mut self, _x: &[f64], _scratch: &mut [f64]) -> Result<(), StepError> {

@@ -34,6 +34,7 @@ pub(crate) mod second_order;
 mod step;
 pub(crate) mod sweep;
 pub(crate) mod tables;
+pub(crate) mod weigh;
 
 use crate::equations::weighted;
 use crate::error::StepError;
@@ -43,6 +44,7 @@ use crate::model::{First, Model, State};
 use crate::registers::four::{Apart, Four};
 use crate::registers::storage::{Fixed, Keep, List, Row, Storage};
 use crate::scheme::{SchemeRef, Tables};
+use crate::unlike::Declarations;
 use crate::workspace::width;
 use core::marker::PhantomData;
 use evaluation::Places;
@@ -64,6 +66,7 @@ pub(crate) struct Points<const N: usize, S: Storage> {
     places: S::Kept<Places<N>>,
     is_warm: bool,
     last_step: f64,
+    declarations: Declarations<N>,
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     isa: Option<pulp::x86::V3>,
 }
@@ -100,6 +103,11 @@ struct Leg<'a, const N: usize, S: Storage> {
     low: &'a State<N>,
     tables: &'a Fixed<S>,
     inertia: &'a Inertia<N, S>,
+    /// What changes of forces of second-order equations, or of rates of coordinates, are multiplied by before they are
+    /// compared with each other.
+    factors: [f64; N],
+    /// The same for the rates of momenta in phase space.
+    force_factors: [f64; N],
 }
 
 /// How a step with all points at once has ended.
@@ -140,6 +148,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
             tables,
             is_warm: false,
             last_step: 0.0,
+            declarations: Declarations::of::<M>(),
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
             isa: pulp::x86::V3::try_new(),
         })

@@ -14,6 +14,7 @@ use crate::lu::{Block, factor_block, solve};
 use crate::model::{First, Model, Second};
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
+use crate::unlike::{by_coordinate, own_increment};
 
 pub(crate) struct VelocityForm<'a, M, const N: usize> {
     pub(crate) model: &'a M,
@@ -322,6 +323,13 @@ where
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
         self.span.measure_rates(x, step)
+    }
+
+    fn measure_own(&self, x: &[f64], step: &[f64]) -> Option<f64> {
+        if const { N == 1 } {
+            return None;
+        }
+        own_increment::<M, N>(&by_coordinate(x), &by_coordinate(step), 0.0)
     }
 
     fn finish(&mut self, x: &[f64], scratch: &mut [f64]) -> Result<(), StepError> {

@@ -12,6 +12,7 @@ use crate::registers::pair::{Eight, LANES, Pair};
 use crate::registers::storage::Heap;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::{Contraction, Statistics};
+use crate::unlike::Declarations;
 
 /// The tables and the working memory of steps side by side.
 #[derive(Clone, Debug)]
@@ -20,6 +21,7 @@ pub(super) struct Engine<const N: usize> {
     inertia: Inertia<N, Heap>,
     work: Work<N>,
     last_step: f64,
+    declarations: Declarations<N>,
     #[cfg(all(feature = "simd", target_arch = "x86_64"))]
     pub(super) registers: Registers,
 }
@@ -83,6 +85,7 @@ impl<const N: usize> Engine<N> {
             inertia,
             work,
             last_step: 0.0,
+            declarations: Declarations::of::<M>(),
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
             registers: if M::LANES {
                 Registers::of_processor()
@@ -123,6 +126,7 @@ impl<const N: usize> Engine<N> {
             control,
             t,
             h,
+            declarations: self.declarations,
         };
         for (group, lanes) in groups.iter_mut().zip(lanes.chunks(LANES)) {
             if group.warm != [true; LANES] {

@@ -13,6 +13,7 @@ use crate::points::tables::Tables;
 use crate::registers::pair::{Eight, LANES};
 use crate::registers::storage::Heap;
 use crate::statistics::{Contraction, Statistics};
+use crate::unlike::Declarations;
 use alloc::vec::Vec;
 
 /// What is common to all trajectories.
@@ -23,6 +24,7 @@ pub(super) struct Step<'a, M, const N: usize> {
     pub(super) control: &'a Control,
     pub(super) t: f64,
     pub(super) h: f64,
+    pub(super) declarations: Declarations<N>,
 }
 
 /// The iterations after which mass matrices are evaluated anew. The initial guess is accurate to a few digits, so that
@@ -52,6 +54,9 @@ where
             self.begin(like, group, work, Written::of(wanted));
         }
         let mut arrived = self.iterate(like, group, work, wanted, statistics);
+        if const { N > 1 } && self.declarations.are_several && !self.control.is_rough() {
+            arrived = self.settled(like, group, work, arrived);
+        }
 
         if const { is_second_order::<M, N>() } {
             self.prepare_end(like, group, work);

@@ -16,13 +16,14 @@ use crate::constrained::layout::Layout;
 use crate::constrained::own::violated;
 use crate::constrained::residual::relative_residual;
 use crate::constrained::rows::Rows;
-use crate::control::START_TOLERANCE;
+use crate::control::{POSITION_ROUND_OFF, START_TOLERANCE};
 use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::{ConstraintError, StepError};
-use crate::legendre::{conjugate, lagrangian_view_from};
+use crate::legendre::{conjugate, lagrangian_view_from, largest};
 use crate::model::{Constraint, First, Model, Second, State};
 use crate::scheme::{MAX_RATES, SchemeRef};
 use crate::statistics::Statistics;
+use crate::unlike::{by_coordinate, own_increment, raise};
 use crate::velocity_form::{PointDerivatives, VelocityForm};
 
 pub(crate) struct ConstrainedForm<'a, M, const N: usize> {
@@ -296,6 +297,16 @@ impl<const N: usize> ElementConstraints<'_, N> {
         };
         Increment { relative, ..inner }
     }
+
+    /// The largest of the rates x of each coordinate, and of its velocity at the end.
+    fn largest_rates(&self, x: &[f64]) -> [f64; N] {
+        let mut sizes = by_coordinate(&x[..self.layout.rates()]);
+        let end: [f64; N] = by_coordinate(&x[self.layout.end(0)..self.layout.node(0)]);
+        for a in 0..N {
+            raise(&mut sizes[a], end[a]);
+        }
+        sizes
+    }
 }
 
 impl<'a, M, const N: usize> ConstrainedForm<'a, M, N>
@@ -419,6 +430,17 @@ where
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
         self.constraints.measure(x, step)
+    }
+
+    fn measure_own(&self, x: &[f64], step: &[f64]) -> Option<f64> {
+        if const { N == 1 } {
+            return None;
+        }
+        let [sizes, increments] = [x, step].map(|rows| self.constraints.largest_rates(rows));
+        let Span { h, start, .. } = self.constraints.span;
+        // The rounding errors of positions appear in the velocities divided by the step.
+        let noise = POSITION_ROUND_OFF * largest(&start.q) / h.abs();
+        own_increment::<M, N>(&sizes, &increments, noise)
     }
 
     fn finish(&mut self, _: &[f64], _: &mut [f64]) -> Result<(), StepError> {

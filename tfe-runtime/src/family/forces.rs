@@ -9,6 +9,9 @@ use super::newton::Tangent;
 use super::registers::{Outcome, Registers};
 #[cfg(feature = "sparse")]
 use super::scale::Scale;
+use super::settling::Settling;
+#[cfg(feature = "sparse")]
+use super::settling::in_velocity;
 use super::space::{Kind, Leg, Problem};
 use crate::consistency::ModelError;
 use crate::error::StepError;
@@ -20,6 +23,8 @@ use crate::newton::{Monitor, SERVES, Verdict};
 use crate::points::tables::Tables;
 use crate::scheme::{SchemeTable, Tables as _};
 use crate::statistics::{Contraction, Statistics};
+#[cfg(feature = "sparse")]
+use crate::unlike::raise;
 use alloc::vec;
 use core::ops::Deref;
 
@@ -33,6 +38,7 @@ pub(super) struct Forces<M> {
     registers: Registers,
     pub(super) statistics: Statistics,
     preference: Preference,
+    settling: Settling,
     #[cfg(feature = "sparse")]
     tangent: Option<Tangent>,
     /// Time and length of the last step.
@@ -54,6 +60,7 @@ impl<M> Forces<M> {
             registers: self.registers,
             statistics: Statistics::NONE,
             preference: self.preference,
+            settling: self.settling,
             #[cfg(feature = "sparse")]
             tangent: self.tangent,
             last: self.last,
@@ -86,6 +93,7 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
             p: vec![0.0; n],
         };
         Ok(Self {
+            settling: Settling::of(&*model),
             model,
             registers: Registers::new(Kind::of::<M>(), n, problem.tables.groups),
             table,
@@ -160,9 +168,13 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
                 start: &self.start,
                 low: &self.low,
             };
-            let outcome =
-                self.registers
-                    .iterate(&*self.model, &self.problem, &self.control, leg, yielding);
+            let outcome = self.registers.iterate(
+                &*self.model,
+                &self.problem,
+                (&self.control, yielding),
+                leg,
+                &mut self.settling,
+            );
             let iterations = u64::from(outcome.iterations);
             self.statistics.iterations += iterations;
             self.statistics.fixed_point_iterations += iterations;
@@ -265,7 +277,10 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
             self.statistics.newton_iterations += 1;
             own |= fresh;
             evidence.see(increment, own);
-            let verdict = monitor.judge(increment);
+            let own_step = (!self.control.is_rough())
+                .then(|| self.own_step(h, &tangent.rest))
+                .flatten();
+            let verdict = monitor.judge_each(increment, own_step);
             outcome.residual = monitor.last();
             outcome.contraction = monitor.rate();
             match verdict {
@@ -290,6 +305,20 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
         }
         tangent.forget();
         Ok(outcome)
+    }
+
+    /// The size of an increment of the forces relative to each declaration of coordinates.
+    #[cfg(feature = "sparse")]
+    fn own_step(&self, h: f64, step: &[f64]) -> Option<f64> {
+        let points = self.problem.tables.points;
+        (self.settling.declarations).own_increment(0.0, |a| {
+            let (mut force, mut change) = (0.0, 0.0);
+            for l in 0..points {
+                raise(&mut force, self.registers.force_at(l, a).abs());
+                raise(&mut change, step[a * points + l].abs());
+            }
+            in_velocity(&self.problem, (h, a), (force, change))
+        })
     }
 
     fn count_evaluations(&mut self, iterations: u64) {

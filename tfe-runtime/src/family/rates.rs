@@ -19,12 +19,13 @@ use super::node::Node;
 use super::pattern::Pattern;
 use super::point::Point;
 use super::rows::Rows;
+use super::settling::Declarations;
 use super::start::violated;
 use super::tangent::Parts;
 use crate::consistency::ModelError;
 use crate::constrained::element::slopes;
 use crate::constrained::residual::REST;
-use crate::control::START_TOLERANCE;
+use crate::control::{POSITION_ROUND_OFF, START_TOLERANCE};
 use crate::double_double::DoubleDouble;
 use crate::equations::{Increment, relative};
 use crate::error::{ConstraintError, StepError};
@@ -46,6 +47,7 @@ pub(super) struct Rates<M> {
     pub(super) control: Control,
     pub(super) statistics: Statistics,
     constraints: usize,
+    declarations: Declarations,
     matrix: Blocked,
     parts: Parts,
     node: Node,
@@ -80,6 +82,7 @@ impl<M> Rates<M> {
             control: self.control,
             statistics: Statistics::NONE,
             constraints: self.constraints,
+            declarations: self.declarations,
             matrix: self.matrix,
             parts: self.parts,
             node: self.node,
@@ -125,6 +128,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         };
         let size = matrix.size();
         Ok(Self {
+            declarations: Declarations::of(&*model),
             model,
             control,
             statistics: Statistics::NONE,
@@ -333,7 +337,8 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             let increment = self.measure(h);
             own |= fresh;
             evidence.see(increment, own);
-            match monitor.judge(increment) {
+            let own_increment = (!control.is_rough()).then(|| self.measure_own(h)).flatten();
+            match monitor.judge_each(increment, own_increment) {
                 Ok(Verdict::Converged) => return evidence.check(self.control.solve),
                 Ok(Verdict::GoOn) if monitor.is_noise(fresh) => {
                     return evidence.check(self.control.solve);
@@ -371,6 +376,18 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         // Either both are NaN or neither; a multiplier that is not finite spoils the rates in the next iteration.
         let relative = velocity.max(position);
         Increment { relative, position }
+    }
+
+    /// The same relative to the size of each declaration of coordinates.
+    fn measure_own(&self, h: f64) -> Option<f64> {
+        let count = self.table.view().unknowns();
+        // The rounding errors of positions appear in the velocities divided by the step.
+        let noise = POSITION_ROUND_OFF * largest(&self.start.q) / h.abs();
+        let noise = if self.constraints > 0 { noise } else { 0.0 };
+        self.declarations.own_increment(noise, |a| {
+            let of = |numbers: &[f64]| largest(&numbers[a * count..(a + 1) * count]);
+            (of(&self.unknowns), of(&self.step))
+        })
     }
 
     /// Evaluates the model at the points, and the constraints at the end.

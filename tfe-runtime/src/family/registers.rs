@@ -4,11 +4,14 @@ use super::kernel::Kernel;
 use super::model::FamilyState;
 use super::running::{Passes, Place, Running};
 use super::scale::Scale;
+use super::settling::{Settling, in_velocity};
 use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
 use crate::lanes::Lanes;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
 use crate::registers::quad::Quad;
+use crate::unlike::raise;
+use alloc::vec::Vec;
 
 /// The unknowns of a step.
 #[derive(Clone, Debug)]
@@ -61,12 +64,12 @@ impl Registers {
         &mut self,
         kernel: &dyn Kernel,
         problem: &Problem,
-        control: &Control,
+        (control, yielding): (&Control, bool),
         leg: Leg<'_>,
-        yielding: bool,
+        settling: &mut Settling,
     ) -> Outcome {
         let mut monitor = Monitor::of_fixed_point(control.tolerance);
-        let (mut iterations, mut converged) = (0, false);
+        let (mut iterations, mut converged, mut settles) = (0, false, false);
         let most = if yielding {
             control.max_iterations.min(PATIENCE)
         } else {
@@ -74,13 +77,29 @@ impl Registers {
         };
         let scale = Scale::of(problem, leg);
         while iterations < most {
+            if settles {
+                self.copy_forces(problem, &mut settling.before);
+            }
             let mut sizes = Sizes::NONE;
             for group in 0..problem.tables.groups {
                 sizes = sizes.and(self.evaluate(kernel, problem, leg, group, true));
             }
             iterations += 1;
-            let increment = scale.increment(sizes);
-            match monitor.judge(increment) {
+            let verdict = if settles {
+                let own = self.own_increment(problem, leg.h, settling);
+                own.map_or(Ok(Verdict::Converged), |own| monitor.settle(own))
+            } else {
+                monitor.judge(scale.increment(sizes))
+            };
+            match verdict {
+                Ok(Verdict::Converged)
+                    if !settles
+                        && !control.is_rough()
+                        && self.has_small(problem, leg.h, settling) =>
+                {
+                    settles = true;
+                    monitor.begin_to_settle();
+                }
                 Ok(Verdict::Converged) => {
                     // Without Newton's method there is no alternative.
                     converged = !yielding || monitor.evidence(true).check(control.solve).is_ok();
@@ -89,8 +108,8 @@ impl Registers {
                 Ok(Verdict::GoOn) => {}
                 Err(_) => break,
             }
-            let is_hopeless =
-                yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1);
+            let may_be_hopeless = yielding && iterations > 2 && !settles;
+            let is_hopeless = may_be_hopeless && monitor.is_hopeless(most - iterations + 1);
             if is_hopeless || monitor.is_stuck() {
                 break;
             }
@@ -101,6 +120,41 @@ impl Registers {
             residual: monitor.last(),
             contraction: monitor.rate(),
         }
+    }
+
+    /// Whether a declaration of coordinates is small beside the largest one.
+    fn has_small(&self, problem: &Problem, h: f64, settling: &mut Settling) -> bool {
+        if !settling.declarations.may_be_unlike(&problem.velocity) {
+            return false;
+        }
+        self.copy_forces(problem, &mut settling.before);
+        self.own_increment(problem, h, settling).is_some()
+    }
+
+    /// Copies the forces at all points.
+    fn copy_forces(&self, problem: &Problem, forces: &mut Vec<f64>) {
+        let points = problem.tables.points;
+        let count = problem.velocity.len() * points;
+        forces.clear();
+        forces.extend((0..count).map(|k| self.force_at(k % points, k / points)));
+    }
+
+    /// The change of the forces since they were copied, relative to the size of each declaration of coordinates.
+    fn own_increment(&self, problem: &Problem, h: f64, settling: &Settling) -> Option<f64> {
+        let points = problem.tables.points;
+        let Settling {
+            declarations,
+            before,
+        } = settling;
+        declarations.own_increment(0.0, |a| {
+            let (mut largest, mut change) = (0.0, 0.0);
+            for l in 0..points {
+                let force = self.force_at(l, a);
+                raise(&mut largest, force.abs());
+                raise(&mut change, (force - before[a * points + l]).abs());
+            }
+            in_velocity(problem, (h, a), (largest, change))
+        })
     }
 
     /// The residual f(q, z) − f at the points, with the points of a coordinate next to each other.

@@ -51,6 +51,25 @@ pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
         products: &mut [Row<L, N>],
     );
 
+    /// What changes of the force on coordinate `a` are multiplied by before they are compared, in equations of second
+    /// order: 1/m, since momenta of light and heavy bodies are not comparable.
+    #[inline(always)]
+    fn factor(&self, like: V, a: usize) -> V {
+        like.like(self.inertia().inverse_diagonal[a])
+    }
+
+    /// A change of a rate of coordinate `a` as it is compared, in equations of first order.
+    #[inline(always)]
+    fn weighted(&self, _a: usize, change: V) -> V {
+        change
+    }
+
+    /// The same for a rate of its momentum.
+    #[inline(always)]
+    fn weighted_force(&self, _a: usize, change: V) -> V {
+        change
+    }
+
     /// Writes an unknown in those lanes that are to be written.
     fn set(&self, place: &mut [f64; L], value: V);
 

@@ -146,7 +146,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                     let step = like.with(products[c][a]);
                     let rate = like.with(rates[c][a]) + step;
                     at.set(&mut rates[c][a], rate);
-                    changed.raise(step);
+                    changed.raise(at.weighted(a, step));
                     // A value that is not finite shows up in the change.
                     size.raise_finite(rate);
                 }
@@ -158,7 +158,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                 for a in 0..N {
                     let rate = like.with(rates[c][a]) + step[a];
                     at.set(&mut rates[c][a], rate);
-                    changed.raise(step[a]);
+                    changed.raise(at.weighted(a, step[a]));
                     size.raise_finite(rate);
                 }
             }
@@ -244,8 +244,10 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
             }
             for a in 0..N {
                 let (force, rate) = (first.force[a] - first.q[a], first.z[a]);
-                of_forces.0.raise(force - like.with(forces[c][a]));
-                of_rates.0.raise(rate - like.with(rates[c][a]));
+                let of_force = force - like.with(forces[c][a]);
+                let of_rate = rate - like.with(rates[c][a]);
+                of_forces.0.raise(at.weighted_force(a, of_force));
+                of_rates.0.raise(at.weighted(a, of_rate));
                 // A value that is not finite shows up in the changes.
                 of_forces.1.raise_finite(force);
                 of_rates.1.raise_finite(rate);

@@ -162,11 +162,10 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                 } else {
                     given
                 };
-                // Compared as accelerations: momenta of light and heavy bodies are not comparable.
-                let inverse = like.like(inertia.inverse_diagonal[a]);
-                changed.raise(inverse * (force - like.with(forces[c][a])));
+                let factor = at.factor(like, a);
+                changed.raise(factor * (force - like.with(forces[c][a])));
                 // A value that is not finite shows up in the change.
-                size.raise_finite(inverse * force);
+                size.raise_finite(factor * force);
                 at.set(&mut forces[c][a], force);
             }
         }

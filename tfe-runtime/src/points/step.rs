@@ -211,13 +211,19 @@ where
         if const { is_second_order::<M, N>() } {
             points.inertia.set_step(like, self.place.1);
         }
-        let leg = Leg {
+        let mut leg = Leg {
             t: self.place.0,
             h: self.place.1,
             start: self.start.0,
             low: self.start.1,
             tables: &points.tables,
             inertia: &points.inertia,
+            factors: if const { is_second_order::<M, N>() } {
+                points.inertia.inverse_diagonal
+            } else {
+                [1.0; N]
+            },
+            force_factors: [1.0; N],
         };
         work.distance = largest(&leg.start.q);
         if const { is_second_order::<M, N>() } {
@@ -234,6 +240,8 @@ where
             control.max_iterations
         };
         let (mut iterations, mut refresh, mut converged) = (0, true, false);
+        // Whether the increments of small coordinates are compared with these.
+        let mut settles = false;
         if const { is_second_order::<M, N>() } {
             work.integrate_twice::<_, M>(like, &leg);
             if is_rough {
@@ -249,32 +257,49 @@ where
             Some(kept) if const { N > FEW } => like.place(kept),
             _ => new_place.insert(Evaluation::zero(like)),
         };
-        while iterations < most {
-            // The conditions are constants, so that only one of the three iterations is compiled.
-            let increment = if const { is_second_order::<M, N>() } {
-                work.sweep_second_order::<V, M>(like, model, &leg, at)
-            } else if const { is_phase::<M, N>() } {
-                work.sweep_phase::<V, M>(like, model, &leg, at, (iterations == 0, refresh))
-            } else {
-                work.sweep_velocity::<V, M>(like, model, &leg, at, refresh)
-            };
-            iterations += 1;
-            match monitor.judge(increment) {
-                Ok(Verdict::Converged) => {
-                    converged = true;
+        loop {
+            while iterations < most {
+                // The conditions are constants, so that only one of the three iterations is compiled.
+                let increment = if const { is_second_order::<M, N>() } {
+                    work.sweep_second_order::<V, M>(like, model, &leg, at)
+                } else if const { is_phase::<M, N>() } {
+                    work.sweep_phase::<V, M>(like, model, &leg, at, (iterations == 0, refresh))
+                } else {
+                    work.sweep_velocity::<V, M>(like, model, &leg, at, refresh)
+                };
+                iterations += 1;
+                let verdict = if settles {
+                    monitor.settle(increment.relative)
+                } else {
+                    monitor.judge(increment)
+                };
+                match verdict {
+                    Ok(Verdict::Converged) => {
+                        converged = true;
+                        break;
+                    }
+                    Ok(Verdict::GoOn) => {}
+                    Err(_) => break,
+                }
+                // The initial guess is accurate to a few digits, so that one evaluation of the mass matrices usually
+                // suffices.
+                refresh = monitor.rate() > 0.1;
+                let may_be_hopeless = yielding && iterations > 2 && !settles;
+                let is_hopeless = may_be_hopeless && monitor.is_hopeless(most - iterations + 1);
+                if is_hopeless || monitor.is_stuck() {
                     break;
                 }
-                Ok(Verdict::GoOn) => {}
-                Err(_) => break,
+                if const { is_second_order::<M, N>() } {
+                    work.integrate_twice::<_, M>(like, &leg);
+                }
             }
-            // The initial guess is accurate to a few digits, so that one evaluation of the mass matrices usually
-            // suffices.
-            refresh = monitor.rate() > 0.1;
-            let is_hopeless =
-                yielding && iterations > 2 && monitor.is_hopeless(most - iterations + 1);
-            if is_hopeless || monitor.is_stuck() {
+            let of = &points.declarations;
+            let may_settle = const { N > 1 } && of.are_several && !is_rough && !settles;
+            if !(converged && may_settle && leg.weigh::<M>(work, of)) {
                 break;
             }
+            (settles, converged) = (true, false);
+            monitor.begin_to_settle();
             if const { is_second_order::<M, N>() } {
                 work.integrate_twice::<_, M>(like, &leg);
             }

@@ -179,6 +179,33 @@ impl<V: Four, const N: usize, S: Storage> Arrangement<V, 4, N> for Leg<'_, N, S>
     }
 
     #[inline(always)]
+    fn factor(&self, like: V, a: usize) -> V {
+        if const { N == 1 } {
+            like.like(self.inertia.inverse_diagonal[a])
+        } else {
+            like.like(self.factors[a])
+        }
+    }
+
+    #[inline(always)]
+    fn weighted(&self, a: usize, change: V) -> V {
+        if const { N == 1 } {
+            change
+        } else {
+            change.like(self.factors[a]) * change
+        }
+    }
+
+    #[inline(always)]
+    fn weighted_force(&self, a: usize, change: V) -> V {
+        if const { N == 1 } {
+            change
+        } else {
+            change.like(self.force_factors[a]) * change
+        }
+    }
+
+    #[inline(always)]
     fn set(&self, place: &mut [f64; 4], value: V) {
         *place = value.lanes();
     }
