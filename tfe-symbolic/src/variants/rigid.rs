@@ -21,7 +21,8 @@ impl Reduction {
         let elongations = self.elongations(&stiffness).map_err(at_stiffness)?;
         let names = names(&spring.constraint.to_string(), elongations.len());
         for (name, elongation) in names.into_iter().zip(elongations) {
-            self.constrain(name, elongation)
+            let outwards = outwards(&mut self.model.graph, elongation);
+            self.constrain(name, outwards)
                 .map_err(|kind| (spring.span, kind))?;
         }
         let model = &mut self.model;
@@ -113,6 +114,28 @@ impl Reduction {
             value,
         });
         Ok(())
+    }
+}
+
+/// φ or −φ, of which the square tells neither: the one that grows with what changes in it, as r − l. Where that has terms
+/// of both signs, as x₂ − x₁ − l, it is the one from which the rest is subtracted; without a rest φ as it is.
+fn outwards(graph: &mut Graph, elongation: ExprId) -> ExprId {
+    let (constant, terms) = graph.terms(elongation);
+    let (moving, fixed): (Vec<_>, Vec<_>) =
+        (terms.into_iter()).partition(|(_, x)| holds_state(graph, *x));
+    let is_negative = |(c, _): &(Constant, ExprId)| c.is_negative();
+    let falls = if moving.iter().all(is_negative) {
+        true
+    } else if moving.iter().any(is_negative) {
+        let has_rest = !(constant.is_zero() && fixed.is_empty());
+        has_rest && !constant.is_negative() && !fixed.iter().any(is_negative)
+    } else {
+        false
+    };
+    if falls {
+        graph.negate(elongation)
+    } else {
+        elongation
     }
 }
 
