@@ -38,6 +38,13 @@ pub trait Length<const N: usize>: Copy + Debug + PartialEq + Send + Sync + 'stat
     /// A vector as long as `like`, with the values of a function at 0, 1, …
     fn from_fn(like: &Self::Vector, number: impl FnMut(usize) -> f64) -> Self::Vector;
 
+    /// The state of which `numbers` has the coordinates, then the momenta; as long as `like`.
+    fn state_of(like: &Self::State, numbers: &[f64]) -> Self::State {
+        let (q, _) = Self::parts(like);
+        let (of_q, of_p) = numbers.split_at(q.as_ref().len());
+        Self::state(Self::from_fn(q, |a| of_q[a]), Self::from_fn(q, |a| of_p[a]))
+    }
+
     /// A vector as long as `like`, of NaN.
     fn unknown(like: &Self::Vector) -> Self::Vector {
         Self::from_fn(like, |_| f64::NAN)

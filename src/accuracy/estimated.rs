@@ -36,6 +36,17 @@ impl<T> Estimated<T> {
         }
     }
 
+    /// The same estimate, for a motion.
+    pub(crate) fn of<U>(self, motion: U) -> Estimated<U> {
+        Estimated {
+            motion,
+            times: self.times,
+            errors: self.errors,
+            outputs: self.outputs,
+            picked: self.picked,
+        }
+    }
+
     /// The largest estimated relative error over the span: the error of the coordinates divided by the largest
     /// coordinate, of the momenta divided by the largest momentum, and of each declared output divided by its largest
     /// value, whichever is largest.

@@ -4,149 +4,132 @@ mod asked;
 mod graded;
 mod pilots;
 mod place;
-pub(super) mod repeatable;
+mod repeatable;
 mod runs;
+mod trial;
 mod watcher;
 
-use super::mesh::Mesh;
-use crate::accuracy::{Asked, Estimated, Found, Pilot, difference, element_for, search};
+use super::times::Times;
+use crate::accuracy::{Asked, Estimated, Found, Pilot, Trace, difference, element_for, search};
 use crate::error::RunErrorKind;
 use crate::numbers::larger;
 use graded::{Steps, graded, graded_by};
-use repeatable::{Broken, Repeatable};
+use repeatable::Repeatable;
 use runs::{Kept, Runs};
 use std::ops::ControlFlow;
 use tfe_runtime::{Element, Statistics};
 use watcher::{Watcher, follow};
 
-/// Integrates over a mesh, and again with an element of higher order; the difference estimates the error (T-98).
-fn estimated<R: Repeatable<N>, const N: usize>(
-    run: &R,
-    (t0, start): (f64, &R::State),
-    mesh: &Mesh<N>,
-) -> Result<Estimated<R::Motion>, Broken<R::Motion>> {
-    let (element, control) = (run.element(), run.control());
-    let mut stepper = match run.stepper(element, control, true) {
-        Ok(stepper) => stepper,
-        Err(kind) => return Err(Box::new((kind, run.part((t0, start), (t0, start))))),
-    };
-    let mut watcher = Watcher::new(run, &mut stepper, (t0, start));
+/// Integrates over a mesh, and again with an element of higher order; the difference estimates the error (T-98). The
+/// motion is kept by the run.
+fn estimated(run: &dyn Repeatable, mesh: &Times) -> Result<Estimated<()>, RunErrorKind> {
+    let given = run.given();
+    let (element, control) = (given.element, given.control);
+    let mut stepper = run.stepper(element, control, true)?;
+    let mut watcher = Watcher::new(run, &mut *stepper);
     let mut times = Vec::new();
-    let motion = run.record(&mut stepper, mesh, (t0, start), &mut |stepper, at| {
+    stepper.record(mesh, true, &mut |at| {
         times.push(at.t);
-        watcher.pass(run, stepper, at, true);
+        watcher.pass(at.arrived, at.acts, true);
         ControlFlow::Continue(())
     })?;
-    let other = || {
-        // The same steps with one node more. Above the largest number of nodes: two steps of half the length instead.
-        let more = Element::mixed(element.nodes() + 1);
-        let start = (t0, start);
-        if more.validate().is_ok() {
-            let mut stepper = run.stepper(more, control, false)?;
-            return follow(run, &mut stepper, start, mesh, &times).map_err(|stop| stop.0);
-        }
-        let starts = [t0].into_iter().chain(times.iter().copied());
-        // Every element is halved, not only the longest ones.
-        let halves = starts
-            .zip(&times)
-            .flat_map(|(t, next)| [t + 0.5 * (next - t), *next]);
-        let nodes: Vec<f64> = [t0].into_iter().chain(halves).collect();
-        let mut stepper = run.stepper(Element::mixed(element.nodes()), control, false)?;
-        let mesh = match times.is_empty() {
-            true => mesh.clone(),
-            false => run.through(&nodes)?,
-        };
-        follow(run, &mut stepper, start, &mesh, &times).map_err(|stop| stop.0)
-    };
-    match other() {
-        Ok(other) => {
-            let errors = difference(&watcher.trace, &other);
-            Ok(Estimated::new(motion, times, errors, run.outputs(), None))
-        }
-        Err(kind) => Err(Box::new((kind, motion))),
+    let other = compared(run, mesh, &times)?;
+    let errors = difference(&watcher.trace, &other);
+    let outputs = given.outputs.clone();
+    Ok(Estimated::new((), times, errors, outputs, None))
+}
+
+/// The same run with an element of higher order, at the ends of its elements.
+fn compared(run: &dyn Repeatable, mesh: &Times, times: &[f64]) -> Result<Trace, RunErrorKind> {
+    let given = run.given();
+    let (element, control) = (given.element, given.control);
+    // The same steps with one node more. Above the largest number of nodes: two steps of half the length instead.
+    let more = Element::mixed(element.nodes() + 1);
+    if more.validate().is_ok() {
+        let mut stepper = run.stepper(more, control, false)?;
+        return follow(run, &mut *stepper, mesh, times).map_err(|stop| stop.0);
     }
+    let (t0, _) = given.start;
+    let starts = [t0].into_iter().chain(times.iter().copied());
+    // Every element is halved, not only the longest ones.
+    let halves = starts
+        .zip(times)
+        .flat_map(|(t, next)| [t + 0.5 * (next - t), *next]);
+    let nodes: Vec<f64> = [t0].into_iter().chain(halves).collect();
+    let mut stepper = run.stepper(Element::mixed(element.nodes()), control, false)?;
+    let mesh = match times.is_empty() {
+        true => mesh.clone(),
+        false => given.through(&nodes)?,
+    };
+    follow(run, &mut *stepper, &mesh, times).map_err(|stop| stop.0)
 }
 
 /// Half a unit in the last place of 1: a lower bound of every relative error, also where two runs agree to the last
 /// bit.
 const ROUNDING: f64 = f64::EPSILON / 2.0;
 
-/// Searches the element and the step size that meet an accuracy, and runs with them (T-99).
-fn accurate<R: Repeatable<N>, const N: usize>(
-    run: &R,
-    start: &R::State,
+/// Searches the element and the step size that meet an accuracy, and runs with them (T-99). The motion is kept by the
+/// run; without one, `kept` has the state that was reached.
+fn accurate(
+    run: &dyn Repeatable,
     asked: &Asked,
     steps: Steps,
-) -> Result<Estimated<R::Motion>, Broken<R::Motion>> {
-    let t0 = asked.span.start;
+    kept: &mut Kept,
+) -> Result<Estimated<()>, RunErrorKind> {
     let wanted = asked.accuracy;
     let asked = &Asked {
         accuracy: wanted.max(ROUNDING),
         ..asked.clone()
     };
-    let mut kept = Kept::Nothing;
-    let mut work = Statistics::NONE;
-    let outcome = match (steps, run.nodes()) {
+    let outcome = match (steps, run.given().nodes) {
         (_, Some(nodes)) => {
             let element = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
             let given = Asked {
                 graded: graded_by(nodes, element),
                 ..asked.clone()
             };
-            find(run, start, &given, None, (&mut kept, &mut work))
+            find(run, &given, None, kept)
         }
-        (Steps::Varying { damps }, None) if const { R::MAY_VARY } => {
+        (Steps::Varying { damps }, None) => {
             let mut explored = Statistics::NONE;
-            let mut pilot = |first| graded(run, start, asked, damps, first, &mut explored);
-            let found = find(run, start, asked, Some(&mut pilot), (&mut kept, &mut work));
-            work.merge(&explored);
+            let mut pilot = |first| graded(run, asked, damps, first, &mut explored);
+            let found = find(run, asked, Some(&mut pilot), kept);
+            kept.work.merge(&explored);
             found
         }
-        (_, None) => find(run, start, asked, None, (&mut kept, &mut work)),
+        (Steps::Equal, None) => find(run, asked, None, kept),
     };
-    let motion = match kept {
-        Kept::Motion(motion) => motion,
-        Kept::Nothing => run.part((t0, start), (t0, start)),
-        Kept::Part(t, state) => run.part((t0, start), (t, &state)),
-    };
-    concluded((outcome, work), motion, run.outputs(), wanted)
+    concluded((outcome?, kept.work), run.given().outputs.clone(), wanted)
 }
 
-/// The result of a search: the motion with its errors, or why it has not the accuracy that is wanted.
-fn concluded<T>(
-    (outcome, work): (Result<Found, RunErrorKind>, Statistics),
-    motion: T,
+/// The result of a search, or that it has not the accuracy that is wanted.
+fn concluded(
+    (mut found, work): (Found, Statistics),
     outputs: Vec<String>,
     wanted: f64,
-) -> Result<Estimated<T>, Broken<T>> {
-    let mut found = match outcome {
-        Ok(found) => found,
-        Err(kind) => return Err(Box::new((kind, motion))),
-    };
+) -> Result<Estimated<()>, RunErrorKind> {
     found.picked.work = work;
     let (times, errors) = (found.times, found.errors);
-    let estimated = Estimated::new(motion, times, errors, outputs, Some(found.picked));
+    let estimated = Estimated::new((), times, errors, outputs, Some(found.picked));
     let is_possible = wanted >= ROUNDING;
     if found.is_met && is_possible {
         return Ok(estimated);
     }
     let until = estimated.horizon(wanted);
-    let kind = RunErrorKind::AccuracyMissed {
+    Err(RunErrorKind::AccuracyMissed {
         asked: wanted,
         estimate: larger(estimated.error_estimate(), ROUNDING),
         until: until.filter(|_| is_possible),
-    };
-    Err(Box::new((kind, estimated.into_motion())))
+    })
 }
 
-fn find<R: Repeatable<N>, const N: usize>(
-    run: &R,
-    start: &R::State,
+fn find(
+    run: &dyn Repeatable,
     asked: &Asked,
     pilot: Option<&mut Pilot<'_>>,
-    (kept, work): (&mut Kept<R::Motion, R::State>, &mut Statistics),
+    kept: &mut Kept,
 ) -> Result<Found, RunErrorKind> {
-    let mut runs = Runs::new(run, (asked.span.start, start), kept, work);
+    let mut runs = Runs::new(run, kept);
     search(asked, &mut runs, pilot)
 }
 

@@ -33,8 +33,6 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     const FACTS: Facts;
     /// Whether a search for an accuracy may solve elements by fixed-point iteration.
     const MAY_ITERATE: bool;
-    /// Whether H may be linear in the momenta; see [`is_of_first_order`](Self::is_of_first_order).
-    const MAY_BE_OF_FIRST_ORDER: bool;
     /// Whether energy is conserved, so that jumps of it indicate steps that are too long.
     const CONSERVES: bool;
 

@@ -1,6 +1,6 @@
 //! The mesh of a run: its elements and the impulses that act in them.
 
-use super::times::{Elements, Times, check_span, ends};
+use super::times::{Elements, Times, check_span};
 use crate::error::RunErrorKind;
 use crate::motion::{default_step, direction_of};
 use std::ops::Range;
@@ -33,8 +33,7 @@ impl<I> Grid<'_, I> {
 #[derive(Clone, Debug)]
 pub struct Mesh<const N: usize> {
     times: Times,
-    /// In the order in which the run passes them.
-    impulses: Vec<Impulse<N>>,
+    impulses: Ordered<N>,
     /// The step size, if the steps are equal.
     step: Option<f64>,
 }
@@ -49,39 +48,19 @@ impl<const N: usize> Mesh<N> {
     ) -> Result<Self, RunErrorKind> {
         check_span(span, step)?;
         Ok(Self {
-            impulses: in_order(impulses, span)?,
+            impulses: Ordered::new(impulses, span)?,
             times: Times::new(span, step, breaks)?,
             step: (step != 0.0).then_some(step.abs()),
         })
     }
 
-    /// The elements between given times, with the impulses that act in them.
-    pub(crate) fn of_nodes(
-        nodes: &[f64],
-        breaks: &[f64],
-        impulses: &[Impulse<N>],
-    ) -> Result<Self, RunErrorKind> {
-        let (start, end) = ends(nodes);
-        let impulses = acting(start, end, impulses);
-        Self::through(&(start..end), nodes, breaks, &impulses)
-    }
-
-    /// Divides each part between `cuts`, in the order of the run, into equal steps of at most `step`. Some of the cuts
-    /// may be `breaks`. Only impulses inside the cuts are kept.
-    pub(crate) fn even(
-        cuts: &[f64],
-        step: f64,
-        breaks: &[f64],
-        impulses: &[Impulse<N>],
-    ) -> Result<Self, RunErrorKind> {
-        let (start, end) = ends(cuts);
-        let span = start..end;
-        check_span(&span, end - start)?;
-        Ok(Self {
-            impulses: in_order(&acting(start, end, impulses), &span)?,
-            times: Times::even(cuts, step, breaks)?,
+    /// Given elements of a run, and all of its impulses.
+    pub(super) fn of(times: &Times, impulses: &Ordered<N>) -> Self {
+        Self {
+            times: times.clone(),
+            impulses: impulses.clone(),
             step: None,
-        })
+        }
     }
 
     /// The elements between given nodes, which begin and end with the span; breaks are added to the nodes.
@@ -93,7 +72,7 @@ impl<const N: usize> Mesh<N> {
     ) -> Result<Self, RunErrorKind> {
         check_span(span, span.end - span.start)?;
         Ok(Self {
-            impulses: in_order(impulses, span)?,
+            impulses: Ordered::new(impulses, span)?,
             times: Times::through(span, nodes, breaks)?,
             step: None,
         })
@@ -109,26 +88,19 @@ impl<const N: usize> Mesh<N> {
         self.times.direction
     }
 
-    /// The end of the last element.
-    pub(crate) fn end(&self) -> Option<f64> {
-        self.times.end()
+    /// The times of the elements.
+    pub(super) fn times(&self) -> &Times {
+        &self.times
     }
 
     /// The number of elements.
     pub(crate) fn steps(&self) -> usize {
-        self.times.elements().len()
+        self.times.steps()
     }
 
     /// The length of the first element.
     pub(crate) fn first_step(&self) -> Option<f64> {
         self.elements().next().map(|(.., h)| h)
-    }
-
-    /// The ends of the elements that a run from `start` passes after `last`.
-    pub(crate) fn ends_behind(&self, last: f64, start: f64) -> Vec<f64> {
-        let ends = self.elements().map(|(_, next, _)| next);
-        let is_ahead = |next: &f64| (next - last) * (next - start).signum() > 0.0;
-        ends.filter(is_ahead).collect()
     }
 
     /// Start, end and length of each element; see [`Times::elements`].
@@ -138,62 +110,74 @@ impl<const N: usize> Mesh<N> {
 
     /// The time at which the force is first evaluated in an element; see [`Times::begin`].
     pub(crate) fn begin(&self, t: f64, h: f64) -> f64 {
-        if self.times.has_breaks {
-            self.times.begin(t, h)
-        } else {
-            t
+        self.times.begin(t, h)
+    }
+
+    /// The impulses that act in an element; see [`Ordered::within`].
+    pub(crate) fn impulses_in(&self, t: f64, next: f64, last: bool) -> &[Impulse<N>] {
+        self.impulses.within(t, next, last)
+    }
+}
+
+/// Impulses in the order in which a run passes them.
+#[derive(Clone, Debug)]
+pub(super) struct Ordered<const N: usize> {
+    impulses: Vec<Impulse<N>>,
+    /// 1, or −1 in backward integration.
+    direction: f64,
+}
+
+impl<const N: usize> Ordered<N> {
+    /// The impulses of a run over a span.
+    ///
+    /// # Errors
+    /// An impulse outside the span, or one that is not finite.
+    fn new(impulses: &[Impulse<N>], span: &Range<f64>) -> Result<Self, RunErrorKind> {
+        for impulse in impulses {
+            check_within(span, impulse.time, &impulse.value)?;
+        }
+        Ok(Self::of(impulses, span))
+    }
+
+    /// The impulses of a run over a span, all of which are known to lie in it.
+    pub(super) fn of(impulses: &[Impulse<N>], span: &Range<f64>) -> Self {
+        let direction = direction_of(span);
+        let (mut times, mut ordered) = (Vec::new(), Vec::with_capacity(impulses.len()));
+        for impulse in impulses {
+            times.push(impulse.time);
+        }
+        for place in order(&times, direction) {
+            ordered.push(impulses[place]);
+        }
+        Self {
+            impulses: ordered,
+            direction,
         }
     }
 
     /// The impulses that act in the element from `t` to `next`. An impulse at a node belongs to the element that starts
-    /// there; at the end of the span, to the last element.
-    pub(crate) fn impulses_in(&self, t: f64, next: f64, last: bool) -> &[Impulse<N>] {
+    /// there; at the end of a mesh, to its last element.
+    pub(super) fn within(&self, t: f64, next: f64, last: bool) -> &[Impulse<N>] {
         if self.impulses.is_empty() {
             return &[];
         }
-        let direction = self.times.direction;
-        let before = |limit: f64| {
-            self.impulses
-                .partition_point(|impulse| direction * impulse.time < direction * limit)
-        };
-        let end = if last {
-            self.impulses.len()
-        } else {
-            before(next)
-        };
-        &self.impulses[before(t)..end]
+        let place = |impulse: &Impulse<N>| self.direction * impulse.time;
+        let (start, end) = (self.direction * t, self.direction * next);
+        let is_before = |impulse: &Impulse<N>| place(impulse) < start;
+        let acts = |impulse: &Impulse<N>| place(impulse) < end || (last && place(impulse) <= end);
+        let from = self.impulses.partition_point(is_before);
+        &self.impulses[from..self.impulses.partition_point(acts)]
     }
 }
 
-/// The impulses in the order in which a run passes them.
-fn in_order<const N: usize>(
-    impulses: &[Impulse<N>],
-    span: &Range<f64>,
-) -> Result<Vec<Impulse<N>>, RunErrorKind> {
+/// Refuses an impulse outside a span, or one that is not finite.
+fn check_within(span: &Range<f64>, time: f64, impulse: &[f64]) -> Result<(), RunErrorKind> {
     let direction = direction_of(span);
-    let within = |time: f64| {
-        direction * span.start <= direction * time && direction * time <= direction * span.end
-    };
-    for impulse in impulses {
-        if !(within(impulse.time) && impulse.value.iter().all(|value| value.is_finite())) {
-            return Err(RunErrorKind::Impulse { time: impulse.time });
-        }
+    let [start, at, end] = [span.start, time, span.end].map(|time| direction * time);
+    if start <= at && at <= end && impulse.iter().all(|value| value.is_finite()) {
+        return Ok(());
     }
-    let (mut times, mut ordered) = (Vec::new(), Vec::with_capacity(impulses.len()));
-    for impulse in impulses {
-        times.push(impulse.time);
-    }
-    for place in order(&times, direction) {
-        ordered.push(impulses[place]);
-    }
-    Ok(ordered)
-}
-
-/// The impulses between two times, inclusive.
-fn acting<const N: usize>(start: f64, end: f64, impulses: &[Impulse<N>]) -> Vec<Impulse<N>> {
-    let inside =
-        |impulse: &&Impulse<N>| start.min(end) <= impulse.time && impulse.time <= start.max(end);
-    impulses.iter().filter(inside).copied().collect()
+    Err(RunErrorKind::Impulse { time })
 }
 
 /// Whether `time` belongs to the element from `t` to `next`.

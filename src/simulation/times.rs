@@ -39,7 +39,7 @@ pub(super) struct Times {
     segments: Vec<Segment>,
     /// 1, or −1 in backward integration.
     pub(super) direction: f64,
-    pub(super) has_breaks: bool,
+    has_breaks: bool,
 }
 
 impl Times {
@@ -71,9 +71,11 @@ impl Times {
         })
     }
 
-    /// Divides each part between `cuts` into equal steps of at most `step`. Some of the cuts may be `breaks`.
+    /// Divides each part between `cuts`, in the order of the run, into equal steps of at most `step`. Some of the cuts
+    /// may be `breaks`.
     pub(super) fn even(cuts: &[f64], step: f64, breaks: &[f64]) -> Result<Self, RunErrorKind> {
         let (start, end) = ends(cuts);
+        check_span(&(start..end), end - start)?;
         let direction = direction_of(&(start..end));
         let mut breaks = breaks.to_vec();
         sort_times(&mut breaks, direction);
@@ -93,6 +95,14 @@ impl Times {
             direction,
             has_breaks: !breaks.is_empty(),
         })
+    }
+
+    /// The elements between given nodes; breaks are added to these.
+    pub(super) fn of_nodes(nodes: &[f64], breaks: &[f64]) -> Result<Self, RunErrorKind> {
+        let (start, end) = ends(nodes);
+        let span = start..end;
+        check_span(&span, end - start)?;
+        Self::through(&span, nodes, breaks)
     }
 
     /// The elements between given nodes, which begin and end with the span; breaks are added to the nodes.
@@ -136,6 +146,18 @@ impl Times {
         self.segments.last().map(|segment| segment.end)
     }
 
+    /// The number of elements.
+    pub(super) fn steps(&self) -> usize {
+        self.elements().len()
+    }
+
+    /// The ends of the elements that a run from `start` passes after `last`.
+    pub(super) fn ends_behind(&self, last: f64, start: f64) -> Vec<f64> {
+        let ends = self.elements().map(|(_, next, _)| next);
+        let is_ahead = |next: &f64| (next - last) * (next - start).signum() > 0.0;
+        ends.filter(is_ahead).collect()
+    }
+
     /// Start, end and length of each element. An element ends exactly where the next one starts. Lengths of equal steps
     /// are equal to the bit, unlike differences of times, so that one factorisation serves many elements.
     pub(super) fn elements(&self) -> Elements<'_> {
@@ -147,7 +169,16 @@ impl Times {
 
     /// The time at which the force is first evaluated in the element that begins at `t` and has the length `h`: `t`, or
     /// a few ulps later if `t` is a break, so that an element with a point at its start sees the force after the break.
+    #[inline]
     pub(super) fn begin(&self, t: f64, h: f64) -> f64 {
+        if self.has_breaks {
+            self.behind_break(t, h)
+        } else {
+            t
+        }
+    }
+
+    fn behind_break(&self, t: f64, h: f64) -> f64 {
         let is_before = |segment: &Segment| self.direction * segment.start < self.direction * t;
         let segment = self.segments.get(self.segments.partition_point(is_before));
         match segment {
@@ -260,7 +291,8 @@ impl Endless {
     }
 }
 
-pub(super) fn ends(times: &[f64]) -> (f64, f64) {
+/// The first and the last of at least two times.
+fn ends(times: &[f64]) -> (f64, f64) {
     match times {
         [start, .., end] => (*start, *end),
         _ => (0.0, 0.0),

@@ -1,23 +1,19 @@
 //! The calls for runs with error estimates and for runs with a prescribed accuracy.
 
-use super::super::events::Severed;
-use super::super::follow::Follow;
-use super::super::kind::{Chosen, Simulated};
+use super::super::kind::Simulated;
 use super::super::mesh::{Grid, Mesh};
 use super::super::setup::Simulation;
 use super::super::times::check_span;
 use super::graded::Steps;
-use super::repeatable::{At, Broken, Passing, Repeatable, trusting};
+use super::runs::Kept;
+use super::trial::{Trial, shown};
 use super::{Accurate, accurate, check_accuracy, estimated};
 use crate::accuracy::{Asked, Estimated};
 use crate::error::{RunError, RunErrorKind};
 use crate::length::Length;
-use crate::motion::{Motion, Warning};
-use std::ops::{ControlFlow, Range};
-use tfe_runtime::constrained::Trail;
-use tfe_runtime::step::Control;
-use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{Element, Share, Solve, Statistics, StepError};
+use crate::motion::Motion;
+use std::ops::Range;
+use tfe_runtime::Solve;
 
 impl<M, const N: usize, L> Simulation<'_, M, N, L>
 where
@@ -111,9 +107,12 @@ where
     ) -> Result<Estimated<Motion<N, L>>, RunError<N, L>> {
         let at_start = (span.start, &start);
         let found = self.model.guarded(|| {
-            let mesh = self.prepare(&start, &span).map(|(mesh, _)| mesh);
-            let mesh = mesh.map_err(|kind| self.refused(kind, at_start))?;
-            estimated(self, at_start, &mesh).map_err(|broken| RunError::new(broken.0, broken.1))
+            let mesh = match self.prepare(&start, &span) {
+                Ok((mesh, _)) => mesh,
+                Err(kind) => return Err(self.refused(kind, at_start)),
+            };
+            let trial = Trial::new(self, at_start, &span);
+            trial.told(estimated(&trial, mesh.times()), None)
         });
         found.unwrap_or_else(|| Err(self.refused(RunErrorKind::panicked(span.start), at_start)))
     }
@@ -153,9 +152,11 @@ where
         let run = &run;
         let at_start = (span.start, &start);
         if span.start == span.end {
-            check_accuracy(self.accuracy).map_err(|kind| run.refused(kind, at_start))?;
+            if let Err(kind) = check_accuracy(self.accuracy) {
+                return Err(run.refused(kind, at_start));
+            }
             let motion = run.run(start, span)?;
-            let outputs = run.outputs();
+            let outputs = shown(&run.model.output_names());
             // Empty lists of errors: for the coordinates, the momenta and each output.
             let errors = vec![Vec::new(); 2 + outputs.len()];
             return Ok(Estimated::new(motion, Vec::new(), errors, outputs, None));
@@ -172,8 +173,9 @@ where
         span: &Range<f64>,
     ) -> Result<Estimated<Motion<N, L>>, RunError<N, L>> {
         let (_, start) = at_start;
-        let checked = self.check(run, start, span);
-        checked.map_err(|kind| run.refused(kind, at_start))?;
+        if let Err(kind) = self.check(run, start, span) {
+            return Err(run.refused(kind, at_start));
+        }
         let asked = Asked {
             accuracy: self.accuracy,
             span: span.clone(),
@@ -190,7 +192,10 @@ where
         let are_equal = self.equal_steps || run.has_events();
         let may_vary = Steps::may_vary(M::FACTS, is_of_first_order) && !are_equal;
         let steps = Steps::of(may_vary, M::IS_CONSTRAINED);
-        accurate(run, start, &asked, steps).map_err(|broken| RunError::new(broken.0, broken.1))
+        let trial = Trial::new(run, at_start, span);
+        let mut kept = Kept::NOTHING;
+        let found = accurate(&trial, &asked, steps, &mut kept);
+        trial.told(found, kept.farthest)
     }
 
     fn check(
@@ -201,288 +206,43 @@ where
     ) -> Result<(), RunErrorKind> {
         check_accuracy(self.accuracy)?;
         run.check_start(start)?;
-        if run.nodes.is_some() {
-            run.mesh(span)?;
+        check_grid(span, run.grid(), M::mesh)?;
+        let first = (span.start, trial_step(span));
+        run.model.check_first(first, start)?;
+        match M::stepper(run.model.clone(), run.chosen()) {
+            Ok(mut stepper) => M::check_velocity(&mut stepper, (span.start, start)),
+            Err(kind) => Err(kind),
         }
-        if let Some(longest) = run.step {
-            check_span(span, longest)?;
-        }
-        // Errors of the span, the breaks and the impulses.
-        let h = (span.end - span.start) / 1000.0;
-        let grid = Grid {
-            step: Some(h),
-            nodes: None,
-            ..run.grid()
-        };
-        M::mesh(span, &grid)?;
-        run.model.check_first((span.start, h), start)?;
-        let mut stepper = M::stepper(run.model.clone(), run.chosen())?;
-        M::check_velocity(&mut stepper, (span.start, start))
     }
 }
 
-impl<'m, M, const N: usize, L> Repeatable<N> for Simulation<'m, M, N, L>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
-    type Model = M;
-    type State = L::State;
-    type Stepper = L::Stepper<'m, M>;
-    type Motion = Motion<N, L>;
+/// A step with which a span is checked before there is another one.
+fn trial_step(span: &Range<f64>) -> f64 {
+    (span.end - span.start) / 1000.0
+}
 
-    const MAY_VARY: bool = Steps::may_vary(M::FACTS, M::MAY_BE_OF_FIRST_ORDER);
-
-    fn element(&self) -> Element {
-        self.chosen_element()
+/// Refuses nodes and longest steps that do not fit the span, and breaks and impulses.
+fn check_grid<I, const N: usize>(
+    span: &Range<f64>,
+    grid: Grid<'_, I>,
+    mesh: fn(&Range<f64>, &Grid<'_, I>) -> Result<Mesh<N>, RunErrorKind>,
+) -> Result<(), RunErrorKind> {
+    if grid.nodes.is_some() {
+        mesh(span, &grid)?;
     }
-
-    fn control(&self) -> Control {
-        self.control
+    if let Some(longest) = grid.step {
+        check_span(span, longest)?;
     }
-
-    fn progress(&self) -> bool {
-        self.progress
-    }
-
-    fn coordinates(&self) -> usize {
-        self.model.coordinates()
-    }
-
-    fn columns(&self) -> usize {
-        self.model.output_count()
-    }
-
-    fn outputs(&self) -> Vec<String> {
-        let names = self.model.output_names();
-        names.iter().map(ToString::to_string).collect()
-    }
-
-    fn stepper(
-        &self,
-        element: Element,
-        control: Control,
-        is_recorded: bool,
-    ) -> Result<L::Stepper<'m, M>, RunErrorKind> {
-        let chosen = Chosen {
-            element,
-            control: trusting(control),
-            ..self.chosen()
-        };
-        let stepper = M::stepper(self.model.clone(), chosen)?;
-        Ok(
-            if self.has_events() || (is_recorded && self.record_every == 1) {
-                stepper
-            } else {
-                M::ends_only(stepper)
-            },
-        )
-    }
-
-    fn advance(
-        &self,
-        stepper: &mut L::Stepper<'m, M>,
-        (t, next, h): (f64, f64, f64),
-        mesh: &Mesh<N>,
-        state: &mut L::State,
-    ) -> Result<(), StepError> {
-        self.model.kick(&self.impulses, (t, h), state);
-        let impulses = mesh.impulses_in(t, next, mesh.end() == Some(next));
-        let element = (mesh.begin(t, h), h);
-        // A panic is reported by the recorded run, which meets it first.
-        let advanced = (self.model).guarded(|| M::advance(stepper, element, state, impulses));
-        advanced.unwrap_or(Err(StepError::NonFinite))
-    }
-
-    fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
-        self.model.failed(element, at, source)
-    }
-
-    fn leave(stepper: &Self::Stepper, trail: &mut Trail) {
-        M::leave(stepper, trail);
-    }
-
-    fn foresee(stepper: &mut Self::Stepper, trail: &Trail, step: (f64, f64)) {
-        M::foresee(stepper, trail, step);
-    }
-
-    fn set_tolerance(stepper: &mut Self::Stepper, tolerance: f64) {
-        M::set_tolerance(stepper, tolerance);
-    }
-
-    fn statistics(stepper: &Self::Stepper) -> Statistics {
-        *M::statistics(stepper)
-    }
-
-    fn take_statistics(stepper: &mut Self::Stepper) -> Statistics {
-        M::take_statistics(stepper)
-    }
-
-    fn model(&self) -> &M {
-        &self.model
-    }
-
-    fn row(&self, stepper: &mut Self::Stepper, at: &At<'_, M, L::State>, row: &mut [f64]) {
-        let At {
-            model, t, state, ..
-        } = *at;
-        let (q, p) = L::parts(state);
-        let n = q.as_ref().len();
-        row[..n].copy_from_slice(q.as_ref());
-        row[n..2 * n].copy_from_slice(p.as_ref());
-        if row.len() == 2 * n {
-            return;
-        }
-        let still = L::zero(q);
-        let velocity = match M::NEEDS_VELOCITY {
-            true => M::node(stepper, model, (t, state), &still).v,
-            false => still,
-        };
-        model.outputs(t, (q, p), &velocity, &mut row[2 * n..]);
-    }
-
-    fn record(
-        &self,
-        stepper: &mut Self::Stepper,
-        mesh: &Mesh<N>,
-        (t, start): (f64, &L::State),
-        passed: &mut Passing<'_, M, Self::Stepper, L::State>,
-    ) -> Result<Motion<N, L>, Broken<Motion<N, L>>> {
-        let mut compared = Compared {
-            passed,
-            model: self.model.clone(),
-            acts: 0,
-            last: t,
-            goes_on: ControlFlow::Continue(()),
-        };
-        let mut motion = self
-            .drive_over((t, start), mesh, stepper, Some(&mut compared))
-            .map_err(|error| Box::new((error.kind().clone(), error.into_partial())))?;
-        if self.crosses_kinks() {
-            motion.add_warning(Warning::KinksCrossed);
-        }
-        // After an event has stopped the run, its state and parameters are kept to the end of the span.
-        let Compared {
-            model,
-            acts,
-            last,
-            goes_on,
-            ..
-        } = compared;
-        if goes_on.is_break() {
-            return Ok(motion);
-        }
-        let ahead = mesh.ends_behind(last, t);
-        if ahead.is_empty() {
-            return Ok(motion);
-        }
-        let is_changed = !motion.settings().is_empty();
-        let exchanged = |stepper: &mut Self::Stepper, model: &Share<'m, M>| match is_changed {
-            true => M::exchange(stepper, model.clone()),
-            false => Ok(()),
-        };
-        if let Err(kind) = exchanged(stepper, &model) {
-            return Err(Box::new((kind, motion)));
-        }
-        let state = motion.last().state();
-        for t in ahead {
-            let at = At {
-                model: &*model,
-                t,
-                state: &state,
-                acts,
-            };
-            let _ = passed(stepper, &at);
-        }
-        match exchanged(stepper, &self.model) {
-            Ok(()) => Ok(motion),
-            Err(kind) => Err(Box::new((kind, motion))),
-        }
-    }
-
-    fn crosses_kinks(&self) -> bool {
-        self.at_kinks != Some(true) && !M::FACTS.smooth
-    }
-
-    fn has_events(&self) -> bool {
-        !self.events.is_empty()
-    }
-
-    fn part(&self, (t0, start): (f64, &L::State), (t, end): (f64, &L::State)) -> Motion<N, L> {
-        let part = self.model.guarded(|| {
-            let stepper = M::stepper(self.model.clone(), self.chosen());
-            let Ok(mut stepper) = stepper else {
-                return self.model.first_node((t0, start), None);
-            };
-            let mut motion = self.model.first_node((t0, start), Some(&mut stepper));
-            if t != t0 {
-                M::record(&mut motion, &mut stepper, &self.model, (t, end));
-            }
-            motion
-        });
-        part.unwrap_or_else(|| Motion::unknown(&*self.model, t0, start))
-    }
-
-    fn even(&self, cuts: &[f64], step: f64) -> Result<Mesh<N>, RunErrorKind> {
-        Mesh::even(cuts, step, &self.breaks, M::inner(&self.impulses))
-    }
-
-    fn through(&self, nodes: &[f64]) -> Result<Mesh<N>, RunErrorKind> {
-        Mesh::of_nodes(nodes, &self.breaks, M::inner(&self.impulses))
-    }
-
-    fn nodes(&self) -> Option<&[f64]> {
-        self.nodes.as_deref()
-    }
+    let trial = Grid {
+        step: Some(trial_step(span)),
+        nodes: None,
+        ..grid
+    };
+    mesh(span, &trial).map(|_| ())
 }
 
 /// The times of the breaks and of the impulses.
 fn with_times<K>(breaks: &[f64], impulses: &[K], time: fn(&K) -> f64) -> Vec<f64> {
     let times = impulses.iter().map(time);
     breaks.iter().copied().chain(times).collect()
-}
-
-/// The follower that reports the end of each element to a comparison of runs.
-struct Compared<'a, 'p, 'm, M, T, S> {
-    passed: &'a mut Passing<'p, M, T, S>,
-    /// The model with the parameters set by events so far.
-    model: Share<'m, M>,
-    /// The number of events that have cut an element so far.
-    acts: usize,
-    last: f64,
-    goes_on: ControlFlow<()>,
-}
-
-impl<'m, M, const N: usize, L> Follow<'m, M, N, L>
-    for Compared<'_, '_, 'm, M, L::Stepper<'m, M>, L::State>
-where
-    M: 'm,
-    L: Length<N>,
-{
-    fn cut(&mut self, _: &Severed<'_, 'm, N, L>) -> Result<(), TransitionError> {
-        self.acts += 1;
-        Ok(())
-    }
-
-    fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
-        self.model = model.clone();
-        Ok(())
-    }
-
-    fn reached(
-        &mut self,
-        stepper: &mut L::Stepper<'m, M>,
-        t: f64,
-        state: &L::State,
-    ) -> ControlFlow<()> {
-        self.last = t;
-        let at = At {
-            model: &*self.model,
-            t,
-            state,
-            acts: self.acts,
-        };
-        self.goes_on = (self.passed)(stepper, &at);
-        self.goes_on
-    }
 }

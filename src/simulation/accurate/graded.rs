@@ -1,6 +1,6 @@
 //! Equal or graded steps: which a run may use, and the pilot run that finds where steps must be short.
 
-use super::pilots;
+use super::pilots::Pilots;
 use super::repeatable::Repeatable;
 use crate::accuracy::{
     Asked, Course, Graded, Grading, damping_element_for, element_for, explore, factor_for,
@@ -22,9 +22,8 @@ pub(super) fn graded_by(nodes: &[f64], element: Element) -> Option<Graded> {
 /// Unless the element was chosen, it is one with numerical damping if `damps`, except where the motion is not stiff:
 /// where the fixed-point iteration converged in nearly all steps of the pilot run, an element with Gauss points is
 /// used.
-pub(super) fn graded<R: Repeatable<N>, const N: usize>(
-    run: &R,
-    start: &R::State,
+pub(super) fn graded(
+    run: &dyn Repeatable,
     asked: &Asked,
     damps: bool,
     first: f64,
@@ -50,7 +49,7 @@ pub(super) fn graded<R: Repeatable<N>, const N: usize>(
         first,
         local: LOCAL,
     };
-    let mut pair = pilots::Pilots::new(run, element, &course, start).ok()?;
+    let mut pair = Pilots::new(run, element, &course).ok()?;
     let grading = explore(&course, &mut pair);
     *work = pair.work();
     let grading = grading?;

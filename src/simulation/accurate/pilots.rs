@@ -1,8 +1,7 @@
 //! The pilot run: two elements of successive orders over the same steps, whose difference estimates the local error.
 
-use super::super::mesh::Mesh;
-use super::super::times::up_to_break;
-use super::repeatable::Repeatable;
+use super::super::times::{Times, up_to_break};
+use super::repeatable::{Repeatable, Stepping};
 use super::runs::MOST_ITERATIONS;
 use crate::accuracy::{Course, Pair, Trace, next};
 use crate::error::RunErrorKind;
@@ -12,18 +11,16 @@ use tfe_runtime::{Element, Statistics, StepError};
 const TOLERANCE: f64 = 1e-3;
 
 /// An element and one of the next order. Both start each step from the state that the second has reached.
-pub(super) struct Pilots<'r, R: Repeatable<N>, const N: usize> {
-    run: &'r R,
+pub(super) struct Pilots<'r> {
     /// The stepper whose error is estimated, and the one of higher order.
-    steppers: [R::Stepper; 2],
-    state: R::State,
-    /// The states that both have reached, and these states as rows of numbers.
-    ends: [R::State; 2],
+    steppers: [Box<dyn Stepping + 'r>; 2],
+    state: Vec<f64>,
+    /// The states that both have reached, with outputs, as rows of numbers.
     rows: [Vec<f64>; 2],
     trace: Trace,
     apart: Vec<f64>,
     sizes: Vec<f64>,
-    mesh: Mesh<N>,
+    mesh: Times,
     breaks: Vec<f64>,
     end: f64,
     /// The Newton iterations of the last attempt; then the number of accepted steps with Newton iterations, and of all.
@@ -33,15 +30,15 @@ pub(super) struct Pilots<'r, R: Repeatable<N>, const N: usize> {
     slides: bool,
 }
 
-impl<'r, R: Repeatable<N>, const N: usize> Pilots<'r, R, N> {
+impl<'r> Pilots<'r> {
     pub(super) fn new(
-        run: &'r R,
+        run: &'r dyn Repeatable,
         element: Element,
         course: &Course,
-        start: &R::State,
     ) -> Result<Self, RunErrorKind> {
         let Course { span, local, .. } = course;
-        let mut control = run.control();
+        let given = run.given();
+        let mut control = given.control;
         control.tolerance = TOLERANCE * local;
         control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
         let stepper = |element| run.stepper(element, control, false);
@@ -49,17 +46,16 @@ impl<'r, R: Repeatable<N>, const N: usize> Pilots<'r, R, N> {
             stepper(element)?,
             stepper(next(element).unwrap_or(Element::mixed(element.nodes())))?,
         ];
-        let trace = Trace::new(run.coordinates(), run.columns());
+        let trace = given.trace();
         let width = trace.width();
+        let (_, start) = &given.start;
         let mut pair = Self {
-            run,
             state: start.clone(),
-            ends: [start.clone(), start.clone()],
             rows: [vec![0.0; width], vec![0.0; width]],
             trace,
             apart: Vec::new(),
             sizes: Vec::new(),
-            mesh: run.even(&[span.start, span.end], (span.end - span.start).abs())?,
+            mesh: given.even(&[span.start, span.end], (span.end - span.start).abs())?,
             breaks: course.breaks.clone(),
             end: span.end,
             newton: 0,
@@ -68,7 +64,7 @@ impl<'r, R: Repeatable<N>, const N: usize> Pilots<'r, R, N> {
             steppers,
         };
         let [_, row] = &mut pair.rows;
-        run.row(&mut pair.steppers[1], &run.at(span.start, start), row);
+        pair.steppers[1].row(row);
         pair.trace.pass(row, 0, false);
         pair.trace.sizes_with(row, &mut pair.sizes);
         Ok(pair)
@@ -76,8 +72,9 @@ impl<'r, R: Repeatable<N>, const N: usize> Pilots<'r, R, N> {
 
     /// The work of both steppers.
     pub(super) fn work(&self) -> Statistics {
-        let [mut work, other] = self.steppers.each_ref().map(R::statistics);
-        work.merge(&other);
+        let [first, second] = &self.steppers;
+        let mut work = first.statistics();
+        work.merge(&second.statistics());
         work
     }
 
@@ -85,9 +82,14 @@ impl<'r, R: Repeatable<N>, const N: usize> Pilots<'r, R, N> {
     pub(super) fn by_newton(&self) -> f64 {
         self.kept.0 as f64 / self.kept.1.max(1) as f64
     }
+
+    /// The Newton iterations of the second stepper so far.
+    fn newton_iterations(&self) -> u64 {
+        self.steppers[1].statistics().newton_iterations
+    }
 }
 
-impl<R: Repeatable<N>, const N: usize> Pair for Pilots<'_, R, N> {
+impl Pair for Pilots<'_> {
     fn attempt(&mut self, t: f64, h: f64) -> bool {
         let reached = t + h;
         let is_reached = |time: &&f64| (*time - reached).abs() <= 4.0 * f64::EPSILON * time.abs();
@@ -97,27 +99,17 @@ impl<R: Repeatable<N>, const N: usize> Pair for Pilots<'_, R, N> {
             None if is_reached(&&self.end) => (self.end, self.end - t),
             None => (reached, h),
         };
-        let newton = |stepper: &R::Stepper| {
-            let Statistics {
-                newton_iterations, ..
-            } = R::statistics(stepper);
-            newton_iterations
-        };
-        let before = newton(&self.steppers[1]);
+        let before = self.newton_iterations();
         for k in [1, 0] {
             let stepper = &mut self.steppers[k];
-            self.ends[k].clone_from(&self.state);
-            let step = self
-                .run
-                .advance(stepper, (t, next, h), &self.mesh, &mut self.ends[k]);
-            if let Err(error) = step {
+            stepper.place(t, &self.state);
+            if let Err(error) = stepper.advance(&self.mesh, (t, next, h)) {
                 self.slides = error == StepError::Slides;
                 return false;
             }
-            let at = self.run.at(next, &self.ends[k]);
-            self.run.row(stepper, &at, &mut self.rows[k]);
+            stepper.row(&mut self.rows[k]);
         }
-        self.newton = newton(&self.steppers[1]) - before;
+        self.newton = self.newton_iterations() - before;
         let [row, better] = &self.rows;
         self.trace.apart(row, better, &mut self.apart);
         self.trace.sizes_with(better, &mut self.sizes);
@@ -137,8 +129,10 @@ impl<R: Repeatable<N>, const N: usize> Pair for Pilots<'_, R, N> {
     }
 
     fn keep(&mut self) {
-        self.state.clone_from(&self.ends[1]);
-        self.trace.pass(&self.rows[1], 0, false);
+        let [_, better] = &self.rows;
+        let (reached, _) = better.split_at(self.state.len());
+        self.state.copy_from_slice(reached);
+        self.trace.pass(better, 0, false);
         self.kept.0 += usize::from(self.newton > 0);
         self.kept.1 += 1;
     }

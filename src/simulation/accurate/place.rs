@@ -1,9 +1,9 @@
 //! Detects a time that runs cannot pass with any step size, such as a singularity of the motion.
 
-use super::repeatable::{Repeatable, trusting};
+use super::repeatable::{Repeatable, Stepping, trusting};
 use crate::accuracy::{Trace, Way};
 use crate::error::RunErrorKind;
-use crate::simulation::mesh::Mesh;
+use crate::simulation::times::Times;
 
 /// The time at which successive runs with decreasing step size have failed.
 #[derive(Debug, Default)]
@@ -31,16 +31,16 @@ impl Place {
 
     /// Whether no step size leads past the time of failure: several runs have failed there, and trial steps do not get
     /// beyond it.
-    pub(super) fn is_an_end<R: Repeatable<N>, const N: usize>(
+    pub(super) fn is_an_end(
         &mut self,
-        run: &R,
-        start: f64,
-        (way, mesh): (&Way<'_>, &Mesh<N>),
-        stopped: (&RunErrorKind, &R::State),
+        run: &dyn Repeatable,
+        (way, mesh): (&Way<'_>, &Times),
+        stopped: (&RunErrorKind, &[f64]),
     ) -> bool {
         /// The number of failures after which trial steps are made, and the number after which two step sizes must also
         /// agree on the motion beyond.
         const OFTEN: [u32; 2] = [3, 8];
+        let (start, _) = run.given().start;
         let times = self.meet(start, stopped.0);
         let [often, very_often] = OFTEN;
         times >= often && !is_passed(run, way, mesh, stopped, times >= very_often)
@@ -51,29 +51,30 @@ impl Place {
 ///
 /// It does not if it ends in a singularity. With `compares`, it does not either if steps get across a singularity only
 /// by chance: two runs with different step sizes then reach different states.
-fn is_passed<R: Repeatable<N>, const N: usize>(
-    run: &R,
+fn is_passed(
+    run: &dyn Repeatable,
     way: &Way<'_>,
-    mesh: &Mesh<N>,
-    (kind, state): (&RunErrorKind, &R::State),
+    mesh: &Times,
+    (kind, state): (&RunErrorKind, &[f64]),
     compares: bool,
 ) -> bool {
     const OTHER: f64 = 0.618;
     let &RunErrorKind::Solve { time, step, .. } = kind else {
         return true;
     };
-    let control = trusting(run.control());
-    let Ok(mut stepper) = run.stepper(way.element, control, false) else {
+    let given = run.given();
+    let Ok(mut stepper) = run.stepper(way.element, trusting(given.control), false) else {
         return true;
     };
-    let mut trace = Trace::new(run.coordinates(), run.columns());
+    let mut trace = given.trace();
     let mut rows = [vec![0.0; trace.width()], vec![0.0; trace.width()]];
     let [row, _] = &mut rows;
-    run.row(&mut stepper, &run.at(time, state), row);
+    stepper.place(time, state);
+    stepper.row(row);
     trace.pass(row, 0, false);
     for (row, first) in rows.iter_mut().zip([step, OTHER * step]) {
-        match beyond(run, &mut stepper, mesh, (time, step, first), state) {
-            Beyond::Reached(end, state) => run.row(&mut stepper, &run.at(end, &state), row),
+        match beyond(&mut *stepper, mesh, (time, step, first), state) {
+            Beyond::Reached => stepper.row(row),
             Beyond::Stopped => return false,
             Beyond::Unknown => return true,
         }
@@ -93,39 +94,39 @@ fn agree(trace: &Trace, [one, other]: &[Vec<f64>; 2]) -> bool {
 }
 
 /// The outcome of trial steps beyond a time at which a run has failed.
-enum Beyond<S> {
-    Reached(f64, S),
+enum Beyond {
+    /// The stepper is at the end of the trial.
+    Reached,
     Stopped,
     /// The limit on the number of steps was reached before the steps became too short for the resolution of time.
     Unknown,
 }
 
 /// Makes steps from `time` on, the first of length `first`, each shortened as often as it fails.
-fn beyond<R: Repeatable<N>, const N: usize>(
-    run: &R,
-    stepper: &mut R::Stepper,
-    mesh: &Mesh<N>,
+fn beyond(
+    stepper: &mut dyn Stepping,
+    mesh: &Times,
     (time, step, first): (f64, f64, f64),
-    state: &R::State,
-) -> Beyond<R::State> {
+    state: &[f64],
+) -> Beyond {
     /// The length of the trial, in steps of the failed run.
     const FAR: f64 = 4.0;
     const MOST: u32 = 2000;
     /// A remainder shorter than this relative amount of a step is rounding error, and gets no step of its own.
     const ROUNDINGS: f64 = 1.0 - 1e-9;
     let end = time + FAR * step;
-    let (mut t, mut h, mut state) = (time, first, state.clone());
+    let (mut t, mut h, mut state) = (time, first, state.to_vec());
     for _ in 0..MOST {
         let is_last = h.abs() >= ROUNDINGS * (end - t).abs();
         let next = if is_last { end } else { t + h };
         if next == t {
             return Beyond::Stopped;
         }
-        let mut moved = state.clone();
-        match run.advance(stepper, (t, next, next - t), mesh, &mut moved) {
-            Ok(()) if is_last => return Beyond::Reached(end, moved),
+        stepper.place(t, &state);
+        match stepper.advance(mesh, (t, next, next - t)) {
+            Ok(()) if is_last => return Beyond::Reached,
             Ok(()) => {
-                (t, state) = (next, moved);
+                (t, state) = (next, stepper.state());
                 h = if first.abs() > 2.0 * h.abs() {
                     2.0 * h
                 } else {

@@ -1,11 +1,11 @@
-//! Makes the runs of a search for an accuracy, and keeps their steppers and their results.
+//! Makes the runs of a search for an accuracy, and keeps their steppers.
 
 use super::place::Place;
-use super::repeatable::{Passing, Repeatable};
+use super::repeatable::{Repeatable, Stepping};
 use super::watcher::{Watcher, follow};
 use crate::accuracy::{Beside, Failed, Judge, Ran, RanBeside, Runner, Trace, Way};
 use crate::error::RunErrorKind;
-use crate::simulation::mesh::Mesh;
+use crate::simulation::times::Times;
 use std::mem;
 use std::ops::ControlFlow;
 use tfe_runtime::constrained::Trail;
@@ -14,77 +14,78 @@ use tfe_runtime::{Element, Solve, Statistics};
 /// The largest number of fixed-point iterations a step; with more, Newton's method is cheaper.
 pub(super) const MOST_ITERATIONS: u32 = 25;
 
-/// The best result so far: the last recorded motion, or, before there is one, the state that reached farthest.
-pub(super) enum Kept<T, S> {
-    Nothing,
-    Part(f64, S),
-    Motion(T),
+/// What a search keeps besides its result and its motion.
+pub(super) struct Kept {
+    /// The time and the state that reached farthest in runs that were not recorded.
+    pub(super) farthest: Option<(f64, Vec<f64>)>,
+    /// The work of all runs.
+    pub(super) work: Statistics,
 }
 
-impl<T, S> Kept<T, S> {
-    fn keep_part(&mut self, start: f64, t: f64, state: S) {
-        let farthest = match self {
-            Self::Nothing => start,
-            Self::Part(farthest, _) => *farthest,
-            Self::Motion(_) => return,
-        };
+impl Kept {
+    pub(super) const NOTHING: Self = Self {
+        farthest: None,
+        work: Statistics::NONE,
+    };
+
+    fn keep_part(&mut self, start: f64, t: f64, state: Vec<f64>) {
+        let farthest = self.farthest.as_ref().map_or(start, |(time, _)| *time);
         if (t - start).abs() >= (farthest - start).abs() {
-            *self = Self::Part(t, state);
+            self.farthest = Some((t, state));
         }
     }
 }
 
 /// Makes the runs of a search.
-pub(super) struct Runs<'a, R: Repeatable<N>, const N: usize> {
-    run: &'a R,
-    start: (f64, &'a R::State),
+pub(super) struct Runs<'a> {
+    run: &'a dyn Repeatable,
     /// The steppers used last, the most recent first.
-    steppers: Vec<Reusable<R::Stepper>>,
+    steppers: Vec<Reusable<'a>>,
     place: Place,
     /// The stage values that the more accurate run of the last pair has found, as first guesses.
     trail: Trail,
-    kept: &'a mut Kept<R::Motion, R::State>,
-    work: &'a mut Statistics,
+    kept: &'a mut Kept,
 }
 
 /// A stepper with the settings for which it can be used again.
-struct Reusable<T> {
+struct Reusable<'a> {
     by_iteration: bool,
     element: Element,
-    stepper: T,
+    stepper: Box<dyn Stepping + 'a>,
 }
 
-impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
+impl<'a> Runs<'a> {
     /// The number of steppers that are kept: those of two elements.
     const MOST_STEPPERS: usize = 2;
 
-    /// Prepares runs from a start; `kept` receives the best result, and `work` the work of all runs.
-    pub(super) fn new(
-        run: &'a R,
-        start: (f64, &'a R::State),
-        kept: &'a mut Kept<R::Motion, R::State>,
-        work: &'a mut Statistics,
-    ) -> Self {
+    pub(super) fn new(run: &'a dyn Repeatable, kept: &'a mut Kept) -> Self {
         Self {
             run,
-            start,
             steppers: Vec::new(),
             place: Place::default(),
             trail: Trail::new(),
             kept,
-            work,
         }
     }
 
-    /// Takes the stepper with the element and the solver of a run from those that are kept, or creates one.
-    fn take_stepper(&mut self, way: &Way<'_>) -> Result<Reusable<R::Stepper>, RunErrorKind> {
-        let is_known = |one: &Reusable<R::Stepper>| {
-            (one.by_iteration, one.element) == (way.by_iteration, way.element)
-        };
+    /// A stepper at the start with the element, the solver and the tolerance of a run, from those that are kept or new.
+    fn take_stepper(&mut self, way: &Way<'_>) -> Result<Reusable<'a>, RunErrorKind> {
+        let mut reusable = self.find_stepper(way)?;
+        reusable.stepper.set_tolerance(way.tolerance);
+        Ok(reusable)
+    }
+
+    fn find_stepper(&mut self, way: &Way<'_>) -> Result<Reusable<'a>, RunErrorKind> {
+        let given = self.run.given();
+        let is_known =
+            |one: &Reusable<'a>| (one.by_iteration, one.element) == (way.by_iteration, way.element);
         if let Some(known) = self.steppers.iter().position(is_known) {
-            return Ok(self.steppers.remove(known));
+            let mut known = self.steppers.remove(known);
+            let (t, start) = &given.start;
+            known.stepper.place(*t, start);
+            return Ok(known);
         }
-        let mut control = self.run.control();
+        let mut control = given.control;
         if way.by_iteration {
             control.solve = Solve::FixedPoint;
             control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
@@ -97,84 +98,63 @@ impl<'a, R: Repeatable<N>, const N: usize> Runs<'a, R, N> {
     }
 
     /// Adds the work of a stepper to the total, keeps the stepper for the next run, and returns its work in this run.
-    fn keep_stepper(&mut self, mut reusable: Reusable<R::Stepper>) -> Statistics {
-        let taken = R::take_statistics(&mut reusable.stepper);
-        self.work.merge(&taken);
+    fn keep_stepper(&mut self, mut reusable: Reusable<'a>) -> Statistics {
+        let taken = reusable.stepper.take_statistics();
+        self.kept.work.merge(&taken);
         self.steppers.insert(0, reusable);
         self.steppers.truncate(Self::MOST_STEPPERS);
         taken
     }
 
-    fn mesh(&self, way: &Way<'_>) -> Result<Mesh<N>, RunErrorKind> {
+    fn mesh(&self, way: &Way<'_>) -> Result<Times, RunErrorKind> {
+        let given = self.run.given();
         match way.grading {
-            Some(grading) => self.run.through(&way.nodes(grading)),
-            None => self.run.even(way.cuts, way.step),
-        }
-    }
-
-    /// Makes a run whose motion may be the result of the search.
-    fn record(
-        &mut self,
-        stepper: &mut R::Stepper,
-        mesh: &Mesh<N>,
-        passed: &mut Passing<'_, R::Model, R::Stepper, R::State>,
-    ) -> Result<(), Failed> {
-        match self.run.record(stepper, mesh, self.start, passed) {
-            Ok(motion) => {
-                *self.kept = Kept::Motion(motion);
-                Ok(())
-            }
-            Err(broken) => {
-                let (kind, part) = *broken;
-                if !matches!(self.kept, Kept::Motion(_)) {
-                    *self.kept = Kept::Motion(part);
-                }
-                Err(Failed::from(kind))
-            }
+            Some(grading) => given.through(&way.nodes(grading)),
+            None => given.even(way.cuts, way.step),
         }
     }
 
     fn trace(
         &mut self,
-        stepper: &mut R::Stepper,
+        stepper: &mut dyn Stepping,
         way: &Way<'_>,
-        mesh: &Mesh<N>,
+        mesh: &Times,
     ) -> Result<Trace, Failed> {
         let (run, times) = (self.run, &way.cuts[1..]);
         if way.keeps {
-            let mut watcher = Watcher::new(run, stepper, self.start);
+            let mut watcher = Watcher::new(run, stepper);
             let mut times = times.iter().peekable();
-            self.record(stepper, mesh, &mut |stepper, at| {
+            stepper.record(mesh, true, &mut |at| {
                 let keeps = times.next_if_eq(&&at.t).is_some();
-                watcher.pass(run, stepper, at, keeps);
+                watcher.pass(at.arrived, at.acts, keeps);
                 ControlFlow::Continue(())
             })?;
             return Ok(watcher.trace);
         }
-        follow(run, stepper, self.start, mesh, times).map_err(|(kind, t, state)| {
+        follow(run, stepper, mesh, times).map_err(|stop| {
+            let (kind, t, state) = *stop;
             let mut failed = Failed::from(kind);
-            if !run.has_events() {
-                let stopped = (&failed.kind, &state);
-                failed.is_final |= (self.place).is_an_end(run, self.start.0, (way, mesh), stopped);
+            let given = run.given();
+            if !given.has_events {
+                let stopped = (&failed.kind, &state[..]);
+                failed.is_final |= self.place.is_an_end(run, (way, mesh), stopped);
             }
-            self.kept.keep_part(self.start.0, t, state);
+            self.kept.keep_part(given.start.0, t, state);
             failed
         })
     }
 }
 
-impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
+impl Runner for Runs<'_> {
     fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
         let mesh = self.mesh(way)?;
         let mut reusable = self.take_stepper(way)?;
-        R::set_tolerance(&mut reusable.stepper, way.tolerance);
-        let trace = self.trace(&mut reusable.stepper, way, &mesh);
+        let trace = self.trace(&mut *reusable.stepper, way, &mesh);
         let taken = self.keep_stepper(reusable);
+        let crosses_kinks = self.run.given().crosses_kinks;
         Ok(Ran {
             trace: trace?,
-            contracts: taken.newton_iterations == 0
-                && taken.products == 0
-                && !self.run.crosses_kinks(),
+            contracts: taken.newton_iterations == 0 && taken.products == 0 && !crosses_kinks,
         })
     }
 
@@ -184,55 +164,53 @@ impl<R: Repeatable<N>, const N: usize> Runner for Runs<'_, R, N> {
         better: &Way<'_>,
         judge: &mut Judge<'_>,
     ) -> Result<RanBeside, Failed> {
-        let (run, (t0, start)) = (self.run, self.start);
+        let run = self.run;
         let mesh = self.mesh(way)?;
         let (mut first, mut second) = (self.take_stepper(way)?, self.take_stepper(better)?);
-        R::set_tolerance(&mut first.stepper, way.tolerance);
-        R::set_tolerance(&mut second.stepper, better.tolerance);
         let mut watchers = [
-            Watcher::new(run, &mut first.stepper, self.start),
-            Watcher::new(run, &mut second.stepper, self.start),
+            Watcher::new(run, &mut *first.stepper),
+            Watcher::new(run, &mut *second.stepper),
         ];
         let mut elements = mesh.elements().enumerate().peekable();
         // First guesses: the first stepper takes them from the more accurate run of the last pair, the second from the
         // first stepper in the same step.
         let before = mem::take(&mut self.trail);
         let (mut trail, mut here) = (Trail::new(), Trail::new());
-        let mut state = start.clone();
         let mut shown = Shown::default();
         let mut failure = None;
         let mut goes_on = ControlFlow::Continue(());
-        let passed = self.record(&mut first.stepper, &mesh, &mut |stepper, at| {
+        let beside = &mut second.stepper;
+        let passed = first.stepper.record(&mesh, true, &mut |at| {
             // The second stepper makes the same step.
             let Some((element, (from, next, h))) = elements.next() else {
                 return ControlFlow::Continue(());
             };
             here.clear();
-            R::leave(stepper, &mut here);
-            R::foresee(&mut second.stepper, &here, (from, h));
-            let step = run.advance(&mut second.stepper, (from, next, h), &mesh, &mut state);
-            if let Err(source) = step {
+            at.arrived.leave(&mut here);
+            beside.foresee(&here, (from, h));
+            if let Err(source) = beside.advance(&mesh, (from, next, h)) {
                 failure = Some(run.failed(element, (from, h), source));
                 return ControlFlow::Break(());
             }
-            R::leave(&second.stepper, &mut trail);
+            beside.leave(&mut trail);
             if let Some((_, (from, _, h))) = elements.peek() {
-                R::foresee(stepper, &before, (*from, *h));
+                at.arrived.foresee(&before, (*from, *h));
             }
             let [one, other] = &mut watchers;
-            one.pass(run, stepper, at, true);
+            one.pass(at.arrived, at.acts, true);
             // Pairs are not used for runs with events, so the parameters are those of the given model.
-            other.pass(run, &mut second.stepper, &run.at(at.t, &state), true);
+            other.pass(&mut **beside, 0, true);
             goes_on = shown.judge(at.t, &watchers, judge);
             goes_on
         });
-        self.trail = farther(trail, before, t0);
+        self.trail = farther(trail, before, run.given().start.0);
+        let state = second.stepper.state();
         self.keep_stepper(second);
         self.keep_stepper(first);
-        let failed = passed.err().or(failure.map(Failed::from));
-        if let Some(mut failed) = failed {
-            let stopped = (&failed.kind, &state);
-            failed.is_final |= self.place.is_an_end(run, t0, (way, &mesh), stopped);
+        if let Some(kind) = passed.err().or(failure) {
+            let mut failed = Failed::from(kind);
+            let stopped = (&failed.kind, &state[..]);
+            failed.is_final |= self.place.is_an_end(run, (way, &mesh), stopped);
             return Err(failed);
         }
         Ok(RanBeside {

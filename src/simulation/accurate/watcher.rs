@@ -1,10 +1,10 @@
 //! Records the numbers by which runs are compared.
 
-use super::repeatable::{At, Repeatable};
+use super::repeatable::{Arrived, Repeatable, Stepping};
 use crate::accuracy::Trace;
 use crate::error::RunErrorKind;
-use crate::simulation::mesh::Mesh;
 use crate::simulation::progress::Bar;
+use crate::simulation::times::Times;
 use std::ops::ControlFlow;
 
 /// The recorded numbers of a run.
@@ -15,66 +15,57 @@ pub(super) struct Watcher {
 }
 
 impl Watcher {
-    /// Creates a watcher that has recorded the start.
-    pub(super) fn new<R: Repeatable<N>, const N: usize>(
-        run: &R,
-        stepper: &mut R::Stepper,
-        (t, start): (f64, &R::State),
-    ) -> Self {
-        let trace = Trace::new(run.coordinates(), run.columns());
+    /// Creates a watcher that has recorded the start, at which the stepper is.
+    pub(super) fn new(run: &dyn Repeatable, stepper: &mut dyn Stepping) -> Self {
+        let trace = run.given().trace();
         let mut watcher = Self {
             row: vec![0.0; trace.width()],
             trace,
         };
-        watcher.pass(run, stepper, &run.at(t, start), false);
+        watcher.pass(stepper, 0, false);
         watcher
     }
 
-    pub(super) fn pass<R: Repeatable<N>, const N: usize>(
-        &mut self,
-        run: &R,
-        stepper: &mut R::Stepper,
-        at: &At<'_, R::Model, R::State>,
-        keeps: bool,
-    ) {
-        run.row(stepper, at, &mut self.row);
-        self.trace.pass(&self.row, at.acts, keeps);
+    /// Records a place of the run, after a number of events; it becomes a row of the trace if `keeps`.
+    pub(super) fn pass(&mut self, arrived: &mut (impl Arrived + ?Sized), acts: usize, keeps: bool) {
+        arrived.row(&mut self.row);
+        self.trace.pass(&self.row, acts, keeps);
     }
 }
 
 /// Why, when and in which state a run has failed.
-pub(super) type Stop<S> = (RunErrorKind, f64, S);
+pub(super) type Stop = Box<(RunErrorKind, f64, Vec<f64>)>;
 
-/// Runs over a mesh and keeps only the rows at `times`.
-pub(super) fn follow<R: Repeatable<N>, const N: usize>(
-    run: &R,
-    stepper: &mut R::Stepper,
-    (t0, start): (f64, &R::State),
-    mesh: &Mesh<N>,
+/// Runs over a mesh with a stepper at the start, and keeps only the rows at `times`.
+pub(super) fn follow(
+    run: &dyn Repeatable,
+    stepper: &mut dyn Stepping,
+    mesh: &Times,
     times: &[f64],
-) -> Result<Trace, Stop<R::State>> {
-    let mut watcher = Watcher::new(run, stepper, (t0, start));
+) -> Result<Trace, Stop> {
+    let given = run.given();
+    let mut watcher = Watcher::new(run, stepper);
     let mut times = times.iter().peekable();
-    if run.has_events() {
-        let passed = run.record(stepper, mesh, (t0, start), &mut |stepper, at| {
+    if given.has_events {
+        let passed = stepper.record(mesh, false, &mut |at| {
             let keeps = times.next_if_eq(&&at.t).is_some();
-            watcher.pass(run, stepper, at, keeps);
+            watcher.pass(at.arrived, at.acts, keeps);
             ControlFlow::Continue(())
         });
+        let (t0, start) = &given.start;
         return match passed {
-            Ok(_) => Ok(watcher.trace),
-            Err(broken) => Err((broken.0, t0, start.clone())),
+            Ok(()) => Ok(watcher.trace),
+            Err(kind) => Err(Box::new((kind, *t0, start.clone()))),
         };
     }
-    let mut state = start.clone();
-    let mut bar = Bar::new(run.progress(), mesh.steps());
+    let mut bar = Bar::new(given.progress, mesh.steps());
     for (element, (t, next, h)) in mesh.elements().enumerate() {
-        if let Err(source) = run.advance(stepper, (t, next, h), mesh, &mut state) {
+        if let Err(source) = stepper.advance(mesh, (t, next, h)) {
             let kind = run.failed(element, (t, h), source);
-            return Err((kind, t, state));
+            return Err(Box::new((kind, t, stepper.state())));
         }
         let keeps = times.next_if_eq(&&next).is_some();
-        watcher.pass(run, stepper, &run.at(next, &state), keeps);
+        watcher.pass(stepper, 0, keeps);
         bar.advance();
     }
     Ok(watcher.trace)

@@ -37,7 +37,6 @@ fn cutting<'m, M: Model<N>, const N: usize>(
 impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     const FACTS: Facts = M::FACTS;
     const MAY_ITERATE: bool = !M::FACTS.linear && M::CONSTRAINTS.is_empty();
-    const MAY_BE_OF_FIRST_ORDER: bool = may_be_of_first_order::<M, N>();
     const CONSERVES: bool = conserves_energy::<M, N>();
 
     fn coordinates(&self) -> usize {

@@ -22,7 +22,6 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const FACTS: Facts = M::FACTS;
     // Without sparse factorisations, fixed-point iteration is the only method.
     const MAY_ITERATE: bool = M::FACTS.separable && !M::CONSTRAINED;
-    const MAY_BE_OF_FIRST_ORDER: bool = false;
     const CONSERVES: bool = conserves_energies::<M>();
 
     fn coordinates(&self) -> usize {
