@@ -30,17 +30,22 @@ const FOURTH: [f64; 2] = [8.0 / 12.0, -1.0 / 12.0];
 
 /// The derivative at zero by sixth-order differences; the step is reduced if fourth order disagrees, as for a function
 /// that varies much within it.
-pub(crate) fn derivative(distance: f64, f: impl FnMut(f64) -> f64) -> f64 {
-    estimated(distance, f).1
+pub(crate) fn derivative(distance: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
+    estimated(distance, &mut f).1
 }
 
 /// The same with a long step, suited to functions that add numbers of order one to a small argument, or with a short
 /// one, a fraction of that argument, whichever has the smaller rounding error.
-pub(crate) fn derivative_of_either([long, short]: [f64; 2], mut f: impl FnMut(f64) -> f64) -> f64 {
+pub(crate) fn derivative_of_either(distances: [f64; 2], mut f: impl FnMut(f64) -> f64) -> f64 {
+    of_either(distances, &mut f)
+}
+
+/// [`derivative_of_either`], compiled once for all functions.
+fn of_either([long, short]: [f64; 2], f: &mut dyn FnMut(f64) -> f64) -> f64 {
     /// The largest estimated relative error of a derivative that is more than rounding error.
     const KNOWN: f64 = 1e-3;
 
-    let (error, slope) = estimated(long, &mut f);
+    let (error, slope) = estimated(long, f);
     let is_shorter = short > 0.0 && short < long;
     if error <= WELL_KNOWN * slope.abs() || !is_shorter {
         return slope;
@@ -90,7 +95,7 @@ pub(crate) fn derivative_by_time(first: f64, time: f64, f: &mut dyn FnMut(f64) -
             sixth,
             off,
             roundings,
-        } = Difference::over(distance, |s| f(time + s));
+        } = Difference::over(distance, &mut |s| f(time + s));
         let roundings = roundings + 4.0 * f64::EPSILON * time.abs() * sixth.abs() / distance;
         let is_same = |known: &f64| (sixth - known).abs() <= SAME * known.abs() + roundings;
         if let Some(known) = known.filter(is_same) {
@@ -112,7 +117,7 @@ struct Difference {
 }
 
 impl Difference {
-    fn over(distance: f64, mut f: impl FnMut(f64) -> f64) -> Self {
+    fn over(distance: f64, f: &mut dyn FnMut(f64) -> f64) -> Self {
         /// The relative rounding error of a function that is assumed in differences.
         const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
 
@@ -140,7 +145,7 @@ impl Difference {
 }
 
 /// An error estimate of a derivative, and the derivative.
-fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
+fn estimated(distance: f64, f: &mut dyn FnMut(f64) -> f64) -> (f64, f64) {
     /// The number of steps that are tried, each a quarter of the previous one, down to 1e-12 of the first.
     const SHORTER: i32 = 20;
 
@@ -151,7 +156,7 @@ fn estimated(distance: f64, mut f: impl FnMut(f64) -> f64) -> (f64, f64) {
             sixth,
             off,
             roundings,
-        } = Difference::over(distance, &mut f);
+        } = Difference::over(distance, f);
         if off <= (WELL_KNOWN * sixth.abs()).max(roundings) {
             return (off.max(roundings), sixth);
         }
