@@ -38,7 +38,13 @@ pub trait Length<const N: usize>: Copy + Debug + PartialEq + Send + Sync + 'stat
     /// A vector as long as `like`, with the values of a function at 0, 1, …
     fn from_fn(like: &Self::Vector, number: impl FnMut(usize) -> f64) -> Self::Vector;
 
-    /// The state of which `numbers` has the coordinates, then the momenta; as long as `like`.
+    /// The coordinates of a state, then its momenta.
+    fn numbers(state: &Self::State) -> Vec<f64> {
+        let (q, p) = Self::parts(state);
+        [q.as_ref(), p.as_ref()].concat()
+    }
+
+    /// The state that has these [`numbers`](Self::numbers); as long as `like`.
     fn state_of(like: &Self::State, numbers: &[f64]) -> Self::State {
         let (q, _) = Self::parts(like);
         let (of_q, of_p) = numbers.split_at(q.as_ref().len());

@@ -18,6 +18,14 @@ pub struct Resolution<'m, M: 'm, const N: usize, L: Length<N>> {
 
 /// The comparisons so far, and which elements are compared next.
 struct Comparisons<const N: usize, L: Length<N>> {
+    choice: Choice,
+    /// The end of the shorter elements in the previous element, if it was compared.
+    beside: Option<Beside<L::State>>,
+    found: Found,
+}
+
+/// Which elements are compared.
+struct Choice {
     /// The largest contraction ratio of an element that needs no comparison.
     quick: f64,
     doubtful: Sample,
@@ -27,17 +35,19 @@ struct Comparisons<const N: usize, L: Length<N>> {
     passed: usize,
     /// The numbers of Newton iterations and of cuts so far.
     work: (u64, u64),
-    /// The end of the shorter elements in the previous element, if it was compared.
-    beside: Option<Beside<L::State>>,
-    compared: Vec<Compared<L::State>>,
-    /// The least and the largest coordinates and momenta so far.
-    bounds: Option<[L::State; 2]>,
+}
+
+/// What comparisons have found. States are lists of numbers: coordinates, then momenta.
+#[derive(Default)]
+struct Found {
+    compared: Vec<Compared>,
+    bounds: Option<Bounds>,
 }
 
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Resolution<'_, M, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Resolution")
-            .field("compared", &self.comparisons.compared.len())
+            .field("compared", &self.comparisons.found.compared.len())
             .finish_non_exhaustive()
     }
 }
@@ -86,10 +96,10 @@ struct Beside<S> {
 
 /// An element and the difference of its end from that of the shorter elements; infinite if these fail.
 #[derive(Debug)]
-struct Compared<S> {
+struct Compared {
     t: f64,
     h: f64,
-    off: S,
+    off: Vec<f64>,
 }
 
 /// Advances a state over an element, given by start and length; returns false if it fails.
@@ -157,7 +167,7 @@ where
 
     /// The warning of a run whose last state is `last`, if elements do not resolve the motion.
     pub(super) fn warning(&self, last: &L::State) -> Option<Warning> {
-        self.comparisons.warning(last)
+        self.comparisons.found.warning(&L::numbers(last))
     }
 }
 
@@ -170,13 +180,10 @@ struct Asked {
     parts: u32,
 }
 
-impl<const N: usize, L: Length<N>> Comparisons<N, L> {
+impl Choice {
     /// The approximate relative error of an element from which on it is compared. A fixed-point iteration contracts by
     /// about (hω)²; the error of an element of order k is about (hω)ᵏ.
     const DOUBTFUL: f64 = 0.008;
-
-    /// The largest acceptable difference relative to the extent of the motion.
-    const MOST: f64 = 0.03;
 
     /// The number of coordinates above which comparisons are limited to about a tenth of the time of the run, unless
     /// elements are cut.
@@ -192,46 +199,55 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
             cut: Sample::default(),
             passed: 0,
             work: (0, 0),
-            beside: None,
-            compared: Vec::new(),
-            bounds: None,
         }
     }
 
-    /// Counts an element; returns the comparison that it asks for.
-    fn asked(&mut self, statistics: &Statistics, examined: &Examined<'_, N, L>) -> Option<Asked> {
+    /// Counts the element, of so many coordinates and after so many comparisons; returns how it is compared, and
+    /// whether it is at all.
+    fn asked(&mut self, statistics: &Statistics, coordinates: usize, compared: usize) -> Asked {
         // The contraction ratio of an element that was cut is that of its last piece.
         let work = (statistics.newton_iterations, statistics.cuts);
         let (by_newton_or_cut, is_cut) = (work != self.work, work.1 != self.work.1);
         self.work = work;
         self.passed += 1;
-        let is_due = self.is_due((by_newton_or_cut, is_cut), statistics, examined);
-        // If an element was too long for its solution to be verified, a third of it may be, too.
-        let parts = if is_cut { 9 } else { 3 };
-        (is_due || self.beside.is_some()).then_some(Asked { is_due, parts })
-    }
-
-    /// Whether the element is doubtful and selected.
-    fn is_due(
-        &mut self,
-        (by_newton_or_cut, is_cut): (bool, bool),
-        statistics: &Statistics,
-        examined: &Examined<'_, N, L>,
-    ) -> bool {
         // Zero if the last two increments gave no ratio.
         let ratio = statistics.contraction.ratio();
-        if !by_newton_or_cut && 0.0 < ratio && ratio <= self.quick {
-            return false;
+        let is_quick = !by_newton_or_cut && 0.0 < ratio && ratio <= self.quick;
+        Asked {
+            is_due: !is_quick && self.takes(is_cut, coordinates, compared),
+            // If an element was too long for its solution to be verified, a third of it may be, too.
+            parts: if is_cut { 9 } else { 3 },
         }
+    }
+
+    /// Whether a doubtful element is selected.
+    fn takes(&mut self, is_cut: bool, coordinates: usize, compared: usize) -> bool {
         let takes = self.doubtful.takes();
-        (takes && self.is_paid_for(examined)) | (is_cut && self.cut.takes())
+        (takes && self.is_paid_for(coordinates, compared)) | (is_cut && self.cut.takes())
     }
 
     /// Whether a comparison, and one of the next element, would not cost too much.
-    fn is_paid_for(&self, examined: &Examined<'_, N, L>) -> bool {
-        let coordinates = L::parts(examined.before).0.as_ref().len();
-        let comparisons = self.compared.len() + 2;
+    fn is_paid_for(&self, coordinates: usize, compared: usize) -> bool {
+        let comparisons = compared + 2;
         coordinates <= Self::MANY || Self::ELEMENTS_A_COMPARISON * comparisons <= self.passed
+    }
+}
+
+impl<const N: usize, L: Length<N>> Comparisons<N, L> {
+    fn new(element: Element) -> Self {
+        Self {
+            choice: Choice::new(element),
+            beside: None,
+            found: Found::default(),
+        }
+    }
+
+    /// Counts the element; returns the comparison that it asks for.
+    fn asked(&mut self, statistics: &Statistics, examined: &Examined<'_, N, L>) -> Option<Asked> {
+        let coordinates = L::parts(examined.before).0.as_ref().len();
+        let compared = self.found.compared.len();
+        let asked = self.choice.asked(statistics, coordinates, compared);
+        (asked.is_due || self.beside.is_some()).then_some(asked)
     }
 
     /// Compares an element with shorter ones if it is due. After a compared element, the shorter elements are also
@@ -248,7 +264,7 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
             self.compare_from(beside.state, parts, examined, advance);
         }
         if is_due {
-            self.extend(examined.before);
+            self.found.extend(&L::numbers(examined.before));
             let end = self.compare_from(examined.before.clone(), parts, examined, advance);
             let run = examined.after.clone();
             self.beside = end.map(|state| Beside { state, run });
@@ -265,8 +281,9 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
     ) -> Option<L::State> {
         let Examined { t, h, after, .. } = *examined;
         let end = self.end_of_parts((t, h), parts, start, advance);
-        let off = off::<N, L>(end.as_ref(), after);
-        self.compared.push(Compared { t, h, off });
+        let reached = end.as_ref().map(L::numbers);
+        let off = off(reached, L::numbers(after));
+        self.found.compared.push(Compared { t, h, off });
         end
     }
 
@@ -284,23 +301,29 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
             if !advance((start, part), &mut state) {
                 return None;
             }
-            self.extend(&state);
+            self.found.extend(&L::numbers(&state));
         }
         Some(state)
     }
+}
+
+impl Found {
+    /// The largest acceptable difference relative to the extent of the motion.
+    const MOST: f64 = 0.03;
 
     /// Extends the bounds to include a state.
-    fn extend(&mut self, state: &L::State) {
-        self.bounds = Some(match self.bounds.take() {
-            Some(bounds) => extended::<N, L>(&bounds, state),
-            None => [state.clone(), state.clone()],
-        });
+    fn extend(&mut self, state: &[f64]) {
+        match &mut self.bounds {
+            Some(bounds) => bounds.include(state),
+            None => self.bounds = Some(Bounds::of(state)),
+        }
     }
 
     /// The warning of a run whose last state is `last`, if elements do not resolve the motion.
-    fn warning(&self, last: &L::State) -> Option<Warning> {
-        let [least, largest] = extended::<N, L>(self.bounds.as_ref()?, last);
-        let extent = Extent::<N, L>::between(&least, &largest);
+    fn warning(&self, last: &[f64]) -> Option<Warning> {
+        let mut bounds = self.bounds.clone()?;
+        bounds.include(last);
+        let extent = Extent::of(&bounds);
         let mut found = None;
         for Compared { t, h, off } in &self.compared {
             let part = extent.part(off);
@@ -323,75 +346,77 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
     }
 }
 
-/// Combines the components of two states.
-fn paired<const N: usize, L: Length<N>>(
-    one: &L::State,
-    other: &L::State,
-    of: impl Fn(f64, f64) -> f64,
-) -> L::State {
-    let ((q, p), (other_q, other_p)) = (L::parts(one), L::parts(other));
-    let vector = |one: &L::Vector, other: &L::Vector| {
-        let (ones, others) = (one.as_ref(), other.as_ref());
-        L::from_fn(one, |a| of(ones[a], others[a]))
+/// The difference between the end of the shorter elements, if these reach one, and that of the element.
+fn off(end: Option<Vec<f64>>, mut after: Vec<f64>) -> Vec<f64> {
+    let Some(end) = end else {
+        return vec![f64::INFINITY; after.len()];
     };
-    L::state(vector(q, other_q), vector(p, other_p))
+    for (after, end) in after.iter_mut().zip(end) {
+        *after = end - *after;
+    }
+    after
 }
 
-/// The difference between the end of the shorter elements and that of the element.
-fn off<const N: usize, L: Length<N>>(end: Option<&L::State>, after: &L::State) -> L::State {
-    match end {
-        Some(end) => paired::<N, L>(end, after, |end, after| end - after),
-        None => paired::<N, L>(after, after, |_, _| f64::INFINITY),
+/// The least and the largest coordinates and momenta so far.
+#[derive(Clone)]
+struct Bounds {
+    least: Vec<f64>,
+    largest: Vec<f64>,
+}
+
+impl Bounds {
+    fn of(state: &[f64]) -> Self {
+        Self {
+            least: state.to_vec(),
+            largest: state.to_vec(),
+        }
+    }
+
+    fn include(&mut self, state: &[f64]) {
+        let ends = self.least.iter_mut().zip(&mut self.largest);
+        for ((least, largest), number) in ends.zip(state) {
+            *least = least.min(*number);
+            *largest = largest.max(*number);
+        }
     }
 }
 
-fn extended<const N: usize, L: Length<N>>(
-    [least, largest]: &[L::State; 2],
-    state: &L::State,
-) -> [L::State; 2] {
-    [
-        paired::<N, L>(least, state, f64::min),
-        paired::<N, L>(largest, state, f64::max),
-    ]
-}
-
 /// The extent of a motion in phase space.
-struct Extent<const N: usize, L: Length<N>> {
-    range: L::State,
+struct Extent {
+    range: Vec<f64>,
     /// The largest momenta; ones if all are zero.
-    weights: L::Vector,
+    weights: Vec<f64>,
 }
 
-impl<const N: usize, L: Length<N>> Extent<N, L> {
-    fn between(least: &L::State, largest: &L::State) -> Self {
-        let sizes = paired::<N, L>(least, largest, |least, largest| {
-            largest.abs().max(least.abs())
-        });
-        let (_, p) = L::parts(&sizes);
-        let is_moving = p.as_ref().iter().any(|weight| *weight != 0.0);
+impl Extent {
+    fn of(Bounds { least, largest }: &Bounds) -> Self {
+        let ends = || least.iter().zip(largest);
+        let momenta = ends().skip(least.len() / 2);
+        let mut weights: Vec<f64> = momenta
+            .map(|(least, largest)| largest.abs().max(least.abs()))
+            .collect();
+        if weights.iter().all(|weight| *weight == 0.0) {
+            weights.fill(1.0);
+        }
         Self {
-            range: paired::<N, L>(largest, least, |largest, least| largest - least),
-            weights: if is_moving {
-                p.clone()
-            } else {
-                L::from_fn(p, |_| 1.0)
-            },
+            range: ends().map(|(least, largest)| largest - least).collect(),
+            weights,
         }
     }
 
     /// A difference relative to the extent. Differences of positions are weighted with momenta, and those of momenta
     /// with positions, so that units do not matter.
-    fn part(&self, off: &L::State) -> f64 {
-        let relative = |weights: &L::Vector, off: &L::Vector, range: &L::Vector| {
+    fn part(&self, off: &[f64]) -> f64 {
+        let relative = |weights: &[f64], off: &[f64], range: &[f64]| {
             let (mut distance, mut way) = (0.0, 0.0);
-            let numbers = off.as_ref().iter().zip(range.as_ref());
-            for (weight, (off, range)) in weights.as_ref().iter().zip(numbers) {
+            for (weight, (off, range)) in weights.iter().zip(off.iter().zip(range)) {
                 distance += weight * off.abs();
                 way += weight * range;
             }
             if distance == 0.0 { 0.0 } else { distance / way }
         };
-        let ((q, p), (of_q, of_p)) = (L::parts(off), L::parts(&self.range));
+        let coordinates = off.len() / 2;
+        let ((q, p), (of_q, of_p)) = (off.split_at(coordinates), self.range.split_at(coordinates));
         relative(&self.weights, q, of_q).max(relative(of_q, p, of_p))
     }
 }

@@ -55,7 +55,6 @@ where
         (t, start): (f64, &'r L::State),
         span: &Range<f64>,
     ) -> Self {
-        let (q, p) = L::parts(start);
         Self {
             given: Given {
                 element: run.chosen_element(),
@@ -63,7 +62,7 @@ where
                 progress: run.progress,
                 coordinates: run.model.coordinates(),
                 outputs: shown(&run.model.output_names()),
-                start: (t, [q.as_ref(), p.as_ref()].concat()),
+                start: (t, L::numbers(start)),
                 breaks: &run.breaks,
                 nodes: run.nodes.as_deref(),
                 has_events: run.has_events(),
@@ -271,8 +270,7 @@ where
     }
 
     fn state(&self) -> Vec<f64> {
-        let (q, p) = L::parts(&self.state);
-        [q.as_ref(), p.as_ref()].concat()
+        L::numbers(&self.state)
     }
 
     fn advance(&mut self, mesh: &Times, (t, next, h): (f64, f64, f64)) -> Result<(), StepError> {
