@@ -5,13 +5,15 @@
 //! `docs/theory.md`, constraints.
 
 pub(crate) mod allowed;
+mod projection;
 
 use crate::numbers::{larger, row_of};
 use allowed::Held;
 use nalgebra::{DMatrix, DVector};
+use projection::{Led, Projection, all_hold, distance, hold, holonomic, step_to_planes};
 use std::fmt;
-use tfe_runtime::constrained::{self, Residual};
-use tfe_runtime::{LegendreError, Model, ModelError, State, StepError, legendre};
+use tfe_runtime::constrained::{self, Gradients, Residual};
+use tfe_runtime::{Constraint, LegendreError, Model, ModelError, State, StepError, legendre};
 
 /// A consistent state, which satisfies all constraints, with its distance from the values given.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -222,104 +224,68 @@ fn consistent<M: Model<N>, const N: usize>(
     v: [f64; N],
 ) -> Result<Consistent<N>, ConsistentError> {
     model.check()?;
+    let residuals = |q: &[f64; N], v: &[f64; N]| constrained::start_residuals(model, t, q, v, 1.0);
+    let still = [0.0; N];
     let mut q = given;
-    let (mut last, mut iterations) = (f64::INFINITY, 0);
+    let mut projection = Projection::BEGUN;
     while let Some(step) = step_to_constraints::<M, N>(model, t, &given, &q) {
-        iterations += 1;
-        for a in 0..N {
-            q[a] += step[a];
-        }
-        let (size, scale) = (step.norm(), q.iter().map(|q| q * q).sum::<f64>().sqrt());
-        if !size.is_finite() {
-            return Err(StepError::NonFinite.into());
-        }
-        let is_stuck = size >= last && size <= 1e-12 * scale;
-        // A violation that is negligible relative to large coordinates may be large for small ones.
-        if is_stuck || (size <= 2.0 * f64::EPSILON * scale && hold(model, t, &q)) {
+        let is_reached = match projection.pass(&step, &mut q)? {
+            Led::Reached => true,
+            Led::Settled => hold(&residuals(&q, &still)),
+            Led::Closer => false,
+        };
+        if is_reached {
             break;
         }
-        if iterations == MOST {
+        if projection.iterations == MOST {
             return Err(ConsistentError::Unreached {
-                residuals: constrained::start_residuals(model, t, &q, &[0.0; N], 1.0),
-                iterations,
+                residuals: residuals(&q, &still),
+                iterations: projection.iterations,
             });
         }
-        last = size;
     }
     let velocities = constrained::velocity_for(model, t, &q, &v)?;
-    let residuals = constrained::start_residuals(model, t, &q, &velocities, 1.0);
-    if residuals
-        .iter()
-        .any(|residual| !(residual.relative() <= constrained::START_TOLERANCE))
-    {
+    let residuals = residuals(&q, &velocities);
+    if !all_hold(&residuals) {
         return Err(ConsistentError::Unreached {
             residuals,
-            iterations,
+            iterations: projection.iterations,
         });
     }
-    let distance = |a: &[f64; N], b: &[f64; N]| {
-        let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
-        squares.sum::<f64>().sqrt()
-    };
     let independent = constrained::independent(model, t, &q);
     Ok(Consistent {
         state: legendre::state(model, t, &q, &velocities)?,
         velocities,
         position: distance(&q, &given),
         velocity: distance(&velocities, &v),
-        rank: independent.into_iter().filter(|one| *one).count(),
+        rank: rank_of(&independent),
     })
 }
 
-/// Whether a position satisfies the holonomic constraints within the tolerance for a start.
-fn hold<M: Model<N>, const N: usize>(model: &M, t: f64, q: &[f64; N]) -> bool {
-    let residuals = constrained::start_residuals(model, t, q, &[0.0; N], 1.0);
-    let mut positions = residuals.iter().map(|one| one.relative_position);
-    positions.all(|position| position <= constrained::START_TOLERANCE)
+/// The number of independent constraints.
+pub(crate) fn rank_of(independent: &[bool]) -> usize {
+    independent.iter().filter(|one| **one).count()
 }
 
-/// One step of the projection: to the tangent planes of the constraints, and along these towards the given position.
-/// `None` without holonomic constraints.
+/// One step of the projection; see [`step_to_planes`]. `None` without holonomic constraints.
 fn step_to_constraints<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,
     given: &[f64; N],
     q: &[f64; N],
 ) -> Option<DVector<f64>> {
+    let holonomic = holonomic(M::CONSTRAINTS);
+    if holonomic.is_empty() {
+        return None;
+    }
     let count = M::CONSTRAINTS.len();
     let (mut rows, mut drift) = (vec![[0.0; N]; count], vec![0.0; count]);
     let mut values = vec![0.0; count];
     model.constraint_rows(t, q, &mut rows, &mut drift);
     model.constraint_values(t, q, &mut values);
-    let holonomic: Vec<usize> = (0..count)
-        .filter(|c| M::CONSTRAINTS[*c].kind.is_holonomic())
-        .collect();
-    if holonomic.is_empty() {
-        return None;
-    }
-    // Rows are normalised, so that the rank does not depend on the units of constraints, nor on those of coordinates
-    // where these are very different.
     let units = constrained::units(model, t, q);
-    for row in &mut rows {
-        for (entry, unit) in row.iter_mut().zip(&units) {
-            *entry *= unit;
-        }
-    }
-    let length = |c: usize| {
-        let length = rows[c].iter().map(|a| a * a).sum::<f64>().sqrt();
-        if length > 0.0 { length } else { 1.0 }
-    };
-    let a = DMatrix::from_fn(holonomic.len(), N, |row, column| {
-        rows[holonomic[row]][column] / length(holonomic[row])
-    });
-    let phi = DVector::from_fn(holonomic.len(), |row, _| {
-        values[holonomic[row]] / length(holonomic[row])
-    });
-    let back = DVector::from_fn(N, |a, _| (given[a] - q[a]) / units[a]);
-    let inverse = a.clone().pseudo_inverse(1e-10).ok()?;
-    let tangent = &back - &inverse * (&a * &back);
-    let step = tangent - inverse * phi;
-    Some(DVector::from_fn(N, |a, _| step[a] * units[a]))
+    let numbers = (rows.as_flattened_mut(), &values[..]);
+    step_to_planes(&holonomic, numbers, &units, (&given[..], &q[..]))
 }
 
 /// An orthonormal basis of the variations (δp, δq) that the constraints allow at a state: a matrix of 2N rows, ordered
@@ -348,19 +314,20 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
     }
     let v = constrained::velocity(model, t, &state.q, &state.p, &[0.0; N])?;
     let gradients = constrained::gradients(model, t, state, &v)?;
+    Ok(held(M::CONSTRAINTS, &gradients).basis())
+}
+
+/// The motions that constraints with these derivatives allow.
+fn held<const N: usize>(declared: &[Constraint], gradients: &Gradients<N>) -> Held {
     let mut held = Vec::new();
-    for (c, constraint) in M::CONSTRAINTS.iter().enumerate() {
+    for (c, constraint) in declared.iter().enumerate() {
         if !gradients.independent[c] {
             continue;
         }
         let (row, psi_q) = (&gradients.rows[c], &gradients.psi_q[c]);
-        let both = |q: &[f64; N], v: &[f64; N]| {
-            let entries = q.iter().chain(v).copied();
-            DVector::from_iterator(2 * N, entries)
-        };
-        held.push(both(psi_q, row));
+        held.push(DVector::from_vec([&psi_q[..], row].concat()));
         if constraint.kind.is_holonomic() {
-            held.push(both(row, &[0.0; N]));
+            held.push(DVector::from_vec([&row[..], &[0.0; N]].concat()));
         }
     }
     let second = &gradients.second;
@@ -373,11 +340,10 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
             second.zz[row][column - N]
         }
     });
-    let held = Held {
+    Held {
         gradients: held,
         to_momenta,
-    };
-    Ok(held.basis())
+    }
 }
 
 /// The transition matrices of a chain, restricted to the motions that the constraints allow at its nodes.

@@ -1,6 +1,6 @@
 //! The evaluations of a model that motions record, for both kinds of length.
 
-use crate::constraints::ConstraintResidual;
+use crate::constraints::{ConstraintResidual, rank_of};
 use crate::length::{FixedLength, Length, RunTimeLength};
 use crate::numbers::larger;
 use tfe_runtime::family::{self, FamilyState};
@@ -77,7 +77,7 @@ fn largest(residuals: &[constrained::Residual], independent: &[bool]) -> Constra
     ConstraintResidual {
         position,
         velocity: rate,
-        rank: independent.iter().filter(|one| **one).count(),
+        rank: rank_of(independent),
     }
 }
 
