@@ -33,8 +33,15 @@ impl<const N: usize, L: Length<N>> Node<N, L> {
     where
         M: Evaluate<N, L>,
     {
-        let velocity = model.velocity(t, state, guess);
-        Self::of(t, state, velocity.unwrap_or_else(|| L::unknown(guess)))
+        Self::found(t, state, model.velocity(t, state, guess), guess)
+    }
+
+    /// A node from a state and its velocity, as long as `like`; NaN if there is none.
+    fn found(t: f64, state: &L::State, velocity: Option<L::Vector>, like: &L::Vector) -> Self {
+        match velocity {
+            Some(v) => Self::of(t, state, v),
+            None => Self::of(t, state, L::unknown(like)),
+        }
     }
 
     /// The state (q, p), without the time.

@@ -109,16 +109,16 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// Appends a node with its velocity, energy and outputs. These are NaN if the Legendre transform has no solution
     /// (singular mass matrix); the state itself is still valid.
     pub(crate) fn record<M: Evaluate<N, L>>(&mut self, model: &M, t: f64, state: &L::State) {
-        let zero;
-        let guess = match self.velocities.last() {
-            Some(guess) => guess,
-            None => {
-                let (_, p) = L::parts(state);
-                zero = L::zero(p);
-                &zero
-            }
-        };
-        self.record_node(model, Node::new(model, t, state, guess));
+        let guess = self.guess(state);
+        self.record_node(model, Node::new(model, t, state, &guess));
+    }
+
+    /// A guess of the velocity of a state: that of the last node.
+    fn guess(&self, state: &L::State) -> L::Vector {
+        match self.velocities.last() {
+            Some(velocity) => velocity.clone(),
+            None => L::zero(L::parts(state).1),
+        }
     }
 
     /// The same if the velocity is known.
@@ -137,8 +137,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     where
         M: Evaluate<N, L>,
     {
-        let place = self.nodes.len();
-        self.nodes.push(node);
+        let place = self.push(node);
         let node = &self.nodes[place];
         let (t, at) = (node.t, (&node.q, &node.p));
         self.energies.push(model.energy(t, at, &node.v));
@@ -146,10 +145,22 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
             model.outputs(t, at, &node.v, values);
         }
         if const { M::IS_CONSTRAINED } {
-            self.residual.include(model.residual(t, &node.q, &node.v));
-            self.reactions.values.extend(reactions);
+            let residual = model.residual(t, &node.q, &node.v);
+            self.hold(residual, reactions);
         }
+    }
+
+    /// Appends a node with its velocity; returns its index.
+    fn push(&mut self, node: Node<N, L>) -> usize {
         self.velocities.push(node.v.clone());
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
+
+    /// Records the violation of the constraints at the last node, and their reactions.
+    fn hold(&mut self, residual: ConstraintResidual, reactions: Vec<f64>) {
+        self.residual.include(residual);
+        self.reactions.values.extend(reactions);
     }
 
     pub(crate) fn add_warning(&mut self, warning: Warning) {
