@@ -9,20 +9,16 @@ use super::setup::Simulation;
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
 use crate::length::Length;
-use crate::motion::{Motion, Node};
+use crate::motion::{Motion, Node, Warning};
 use std::ops::ControlFlow;
-use tfe_runtime::Share;
 use tfe_runtime::transition::TransitionError;
+use tfe_runtime::{Share, Statistics};
 
 /// Records the elements that a run passes, and calls the follower.
 pub(super) struct Recorder<'f, 'm, M, const N: usize, L: Length<N>> {
-    motion: Motion<N, L>,
+    record: Record<N, L>,
     follower: Follower<'f, 'm, M, N, L>,
-    watch: Watch,
     resolution: Resolution<'m, M, N, L>,
-    record_every: usize,
-    /// Whether energy is conserved, by the model and since the last recorded node.
-    is_conserved: bool,
 }
 
 impl<'f, 'm, M, const N: usize, L> Recorder<'f, 'm, M, N, L>
@@ -40,15 +36,17 @@ where
             follower.recorded(motion.last());
         }
         let mut watch = Watch::new(simulation.chosen_element());
-        watch.pass(Recorded::last_of(&motion, false), &|| 0.0);
-        watch.add(simulation.model.weigh(motion.last()));
+        watch.begin(&motion, simulation.model.weigh(motion.last()));
         Self {
             resolution: Resolution::new(simulation.again()),
-            motion,
+            record: Record {
+                motion,
+                watch,
+                every: simulation.record_every,
+                conserves: M::CONSERVES,
+                is_conserved: M::CONSERVES,
+            },
             follower,
-            watch,
-            record_every: simulation.record_every,
-            is_conserved: M::CONSERVES,
         }
     }
 
@@ -61,8 +59,8 @@ where
         state: &L::State,
         has_impulses: bool,
     ) {
-        model.look(&mut self.watch, number, at, state, false);
-        self.is_conserved &= !has_impulses;
+        model.look(&mut self.record.watch, number, at, state, false);
+        self.record.is_conserved &= !has_impulses;
     }
 
     /// Called after an element that ends at `t`.
@@ -73,17 +71,14 @@ where
         (number, is_last): (usize, bool),
         (t, state): (f64, &L::State),
     ) {
-        if !(is_last || (number + 1).is_multiple_of(self.record_every)) {
+        if !(is_last || self.record.is_due(number)) {
             return;
         }
-        if self.motion.last().t != t {
+        if !self.record.is_at(t) {
             self.record(stepper, model, (t, state));
             self.tell();
         }
-        let recorded = Recorded::last_of(&self.motion, self.is_conserved);
-        let node = self.motion.last();
-        self.watch.pass(recorded, &|| model.rounding_at(node));
-        self.is_conserved = M::CONSERVES;
+        self.record.check_energy(&|node| model.rounding_at(node));
     }
 
     /// Called after an element that failed.
@@ -97,30 +92,74 @@ where
         let Some((t, h, before)) = &broken.piece else {
             return;
         };
-        model.look(&mut self.watch, number, (*t, *h), before, true);
-        if self.motion.last().t != *t {
+        model.look(&mut self.record.watch, number, (*t, *h), before, true);
+        if !self.record.is_at(*t) {
             self.record(stepper, model, (*t, before));
         }
     }
 
     fn record(&mut self, stepper: &mut L::Stepper<'m, M>, model: &M, at: (f64, &L::State)) {
-        M::record(&mut self.motion, stepper, model, at);
+        M::record(&mut self.record.motion, stepper, model, at);
     }
 
     /// Passes the last node to the follower.
     fn tell(&mut self) {
         if let Some(follower) = &mut self.follower {
-            follower.recorded(self.motion.last());
+            follower.recorded(self.record.motion.last());
         }
     }
 
-    pub(super) fn into_motion(
-        mut self,
-        stepper: &L::Stepper<'m, M>,
-        last: &L::State,
-    ) -> Motion<N, L> {
-        self.watch.add(self.resolution.warning(last));
-        self.motion.set_statistics(*M::statistics(stepper));
+    pub(super) fn into_motion(self, stepper: &L::Stepper<'m, M>, last: &L::State) -> Motion<N, L> {
+        let warning = self.resolution.warning(last);
+        self.record.into_motion(warning, *M::statistics(stepper))
+    }
+}
+
+/// The motion that is recorded, and the warnings about its nodes.
+struct Record<const N: usize, L: Length<N>> {
+    motion: Motion<N, L>,
+    watch: Watch,
+    /// The number of elements from one recorded node to the next.
+    every: usize,
+    /// Whether the model conserves energy.
+    conserves: bool,
+    /// Whether energy is conserved, by the model and since the last recorded node.
+    is_conserved: bool,
+}
+
+impl<const N: usize, L: Length<N>> Record<N, L> {
+    /// Whether the end of an element is recorded.
+    fn is_due(&self, number: usize) -> bool {
+        (number + 1).is_multiple_of(self.every)
+    }
+
+    /// Whether the last node is that of a time.
+    fn is_at(&self, t: f64) -> bool {
+        self.motion.last().t == t
+    }
+
+    /// Whether a node at an event is recorded already.
+    fn has(&self, side: Side, (t, state): (f64, &L::State)) -> bool {
+        match side {
+            Side::Before => self.is_at(t),
+            // Impulses at a node act after it, and may lead to an event there.
+            Side::Last => self.is_at(t) && self.motion.last().state() == *state,
+            Side::After => false,
+        }
+    }
+
+    /// Compares the energy of the last node with that of the one before; `rounding` returns its rounding error.
+    fn check_energy(&mut self, rounding: &dyn Fn(&Node<N, L>) -> f64) {
+        let node = self.motion.last();
+        let recorded = Recorded::last_of(&self.motion, self.is_conserved);
+        self.watch.pass(recorded, &|| rounding(node));
+        self.is_conserved = self.conserves;
+    }
+
+    /// The motion with all warnings and the work of its steps.
+    fn into_motion(mut self, warning: Option<Warning>, statistics: Statistics) -> Motion<N, L> {
+        self.watch.add(warning);
+        self.motion.set_statistics(statistics);
         self.motion.set_warnings(self.watch.into_warnings());
         self.motion
     }
@@ -194,7 +233,7 @@ where
     L: Length<N>,
 {
     fn keeps(&self) -> bool {
-        self.record_every == 1
+        self.record.every == 1
     }
 
     fn whole(&mut self, stepper: &L::Stepper<'m, M>, piece: &Piece<'_, N, L>) {
@@ -210,7 +249,7 @@ where
     }
 
     fn inside(&mut self, dense: L::Polynomial) {
-        self.motion.keep_element(dense);
+        self.record.motion.keep_element(dense);
     }
 
     fn at_event(
@@ -220,20 +259,13 @@ where
         side: Side,
         (t, state): (f64, &L::State),
     ) {
-        self.is_conserved = false;
-        let last = self.motion.last();
-        let is_recorded = match side {
-            Side::Before => last.t == t,
-            // Impulses at a node act after it, and may lead to an event there.
-            Side::Last => last.t == t && last.state() == *state,
-            Side::After => false,
-        };
-        if is_recorded {
+        self.record.is_conserved = false;
+        if self.record.has(side, (t, state)) {
             return;
         }
         self.record(stepper, model, (t, state));
         if side == Side::After {
-            self.motion.begin_arc(*M::statistics(stepper));
+            self.record.motion.begin_arc(*M::statistics(stepper));
         }
         self.tell();
     }
@@ -241,6 +273,6 @@ where
     fn changed(&mut self, model: &Share<'m, M>, values: &[(usize, f64)]) {
         self.resolution.set_model(model.clone());
         let names = model.parameter_names();
-        self.motion.set_parameters(&names, values);
+        self.record.motion.set_parameters(&names, values);
     }
 }

@@ -34,6 +34,16 @@ impl Watch {
         }
     }
 
+    /// Begins with the only node of a motion, and the warning about its masses.
+    pub(super) fn begin<const N: usize, L: Length<N>>(
+        &mut self,
+        motion: &Motion<N, L>,
+        masses: Option<Warning>,
+    ) {
+        self.pass(Recorded::last_of(motion, false), &|| 0.0);
+        self.add(masses);
+    }
+
     /// Examines the element that begins at `t` in `state` if its number is 0, 1, 2, 4, 8, … A continued run examines
     /// its first element, then those of 2, 4, … times its number.
     pub(super) fn look<M: Model<N>, const N: usize>(
