@@ -4,6 +4,7 @@
 use crate::evaluate::Evaluate;
 use crate::length::Length;
 use crate::motion::{Motion, Node, Warning};
+use crate::stability::growth::Growth;
 use crate::stability::linear_model::LinearModel;
 use tfe_runtime::{Element, Model, State};
 
@@ -71,14 +72,25 @@ impl Watch {
             // For these the state alone does not determine the stability.
             return;
         }
-        let Some(element) = self.element else { return };
-        if self.last == Some(number) {
-            return;
+        if let Some(element) = self.choose(number) {
+            let growth = match LinearModel::about(model, t, state) {
+                Ok(linear) => linear.growth(element, h),
+                Err(_) => None,
+            };
+            self.judge(element, (t, h), growth);
         }
-        self.last = Some(number);
-        let growth = LinearModel::about(model, t, state)
-            .ok()
-            .and_then(|linear| linear.growth(element, h));
+    }
+
+    /// The element that is examined, unless that of this number was the last.
+    fn choose(&mut self, number: usize) -> Option<Element> {
+        let element = self.element?;
+        let last = self.last.replace(number);
+        (last != Some(number)).then_some(element)
+    }
+
+    /// Warns of a growth that the model does not have; it belongs to the last warning if the element examined before was
+    /// unstable, too.
+    fn judge(&mut self, element: Element, (t, h): (f64, f64), growth: Option<Growth>) {
         let continued = self.is_unstable;
         self.is_unstable = growth.is_some();
         let Some(growth) = growth else { return };

@@ -105,10 +105,13 @@ impl<const N: usize> LinearModel<N> {
         if const { !M::CONSTRAINTS.is_empty() } {
             return Err(LinearModelError::Constrained);
         }
-        model.check().map_err(LinearModelError::Model)?;
-        let view = legendre::hamiltonian_view(model, t, &state.q, &state.p)
-            .map_err(|_| LinearModelError::NoVelocity)?;
-        Self::of(view.second)
+        if let Err(error) = model.check() {
+            return Err(LinearModelError::Model(error));
+        }
+        match legendre::hamiltonian_view(model, t, &state.q, &state.p) {
+            Ok(view) => Self::of(view.second),
+            Err(_) => Err(LinearModelError::NoVelocity),
+        }
     }
 
     fn of(second: Second<f64, N>) -> Result<Self, LinearModelError> {
