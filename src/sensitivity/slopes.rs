@@ -4,7 +4,7 @@ use crate::length::{FixedLength, Length};
 use nalgebra::{DMatrix, DVector};
 use tfe_runtime::constrained::HeldVelocity;
 use tfe_runtime::dual::{Dual, duals};
-use tfe_runtime::{Direction, First, Form, Model, Parameter};
+use tfe_runtime::{CoordinateName, Direction, First, Form, Model, Parameter};
 
 /// A point of a motion with its velocity.
 #[derive(Clone, Copy)]
@@ -62,19 +62,15 @@ pub(crate) struct Along<'a, M, const N: usize> {
 impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
     pub(crate) fn new(model: &'a M, place: Place<'a, N>) -> Self {
         let Place { t, q, p, v } = place;
-        let unknown = || DMatrix::from_element(N, N, f64::NAN);
         let held = HeldVelocity::of(model, t, (q, p), v);
         let inverse = match (M::FORM, &held) {
             (Form::Hamiltonian, _) => None,
             // The constraints do not determine the velocity either.
-            (Form::Lagrangian, Err(_)) => Some(unknown()),
+            (Form::Lagrangian, Err(_)) => Some(unknown(N)),
             (Form::Lagrangian, Ok(_)) => {
                 let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
                 model.first_and_mass(t, q, v, &mut first, &mut zz);
-                let mass = DMatrix::from_fn(N, N, |a, b| zz[a][b]);
-                // By factorisation: for two to four coordinates, nalgebra would divide by the determinant, a product of
-                // as many masses, which may overflow or underflow.
-                Some(mass.lu().try_inverse().unwrap_or_else(unknown))
+                Some(inverse_of(&zz))
             }
         };
         Self {
@@ -94,17 +90,49 @@ impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
         let Some(inverse) = &self.inverse else {
             let p = duals(p, &change.p);
             self.model.first(time, &q, &p, &mut first);
-            return first.z.map(|one| one.slope);
+            return slopes(&first.z);
         };
         // p = L_v(q, v, t): L_vv δv = δp − ∂L_v/∂(t, q, a).
-        self.model.first(time, &q, &duals(v, &[0.0; N]), &mut first);
-        let right = std::array::from_fn(|a| change.p[a] - first.z[a].slope);
-        if let Some(held) = &self.held {
-            return held.slope(self.model, (time, &q), v, &right);
+        self.model.first(time, &q, &still(v), &mut first);
+        let right = difference(&change.p, &slopes(&first.z));
+        match &self.held {
+            Some(held) => held.slope(self.model, (time, &q), v, &right),
+            None => product(inverse, &right),
         }
-        let found = inverse * DVector::from_column_slice(&right);
-        std::array::from_fn(|a| found[a])
     }
+}
+
+fn unknown(size: usize) -> DMatrix<f64> {
+    DMatrix::from_element(size, size, f64::NAN)
+}
+
+fn square<const N: usize>(entries: &[[f64; N]; N]) -> DMatrix<f64> {
+    DMatrix::from_fn(N, N, |a, b| entries[a][b])
+}
+
+/// The inverse of a mass matrix; NaN if it is singular. By factorisation: for two to four coordinates, nalgebra would
+/// divide by the determinant, a product of as many masses, which may overflow or underflow.
+fn inverse_of<const N: usize>(mass: &[[f64; N]; N]) -> DMatrix<f64> {
+    let inverse = square(mass).lu().try_inverse();
+    inverse.unwrap_or_else(|| unknown(N))
+}
+
+fn product<const N: usize>(matrix: &DMatrix<f64>, vector: &[f64; N]) -> [f64; N] {
+    let found = matrix * DVector::from_column_slice(vector);
+    std::array::from_fn(|a| found[a])
+}
+
+fn difference<const N: usize>(a: &[f64; N], b: &[f64; N]) -> [f64; N] {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+/// Numbers that do not change.
+fn still<const N: usize>(values: &[f64; N]) -> [Dual; N] {
+    duals(values, &[0.0; N])
+}
+
+fn slopes<const N: usize>(duals: &[Dual; N]) -> [f64; N] {
+    duals.map(|one| one.slope)
 }
 
 /// Parameters, given by their indices, as directions; with special kernels if the model has them.
@@ -112,15 +140,21 @@ pub(crate) fn directions<M: Model<N>, const N: usize>(
     model: &M,
     indices: &[usize],
 ) -> Vec<Direction> {
-    let parameter = |&index: &usize| {
-        let name = model.parameter_name(index);
-        let named = M::SENSITIVITIES.iter().position(|own| name.is(own));
-        Direction {
-            parameter: Some(named.map_or(Parameter::Any(index), Parameter::Named)),
-            ..Direction::default()
-        }
-    };
-    indices.iter().map(parameter).collect()
+    let mut directions = Vec::with_capacity(indices.len());
+    for index in indices {
+        let name = model.parameter_name(*index);
+        directions.push(direction(*index, &name, M::SENSITIVITIES));
+    }
+    directions
+}
+
+/// The direction of a parameter, one of those with special kernels if its name is among these.
+fn direction(index: usize, name: &CoordinateName, special: &[&str]) -> Direction {
+    let named = special.iter().position(|own| name.is(own));
+    Direction {
+        parameter: Some(named.map_or(Parameter::Any(index), Parameter::Named)),
+        ..Direction::default()
+    }
 }
 
 /// The derivative of the momentum by a parameter, at fixed coordinates and velocities; NaN if the mass matrix is
@@ -132,21 +166,22 @@ pub(crate) fn momentum_by<M: Model<N>, const N: usize>(
     parameter: usize,
 ) -> [f64; N] {
     let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
-    let still = |values| duals(values, &[0.0; N]);
     let mut first = First::zero();
-    match M::FORM {
-        Form::Lagrangian => {
-            model.first(time, &still(q), &still(v), &mut first);
-            first.z.map(|one| one.slope)
-        }
+    if const { matches!(M::FORM, Form::Lagrangian) } {
+        model.first(time, &still(q), &still(v), &mut first);
+        slopes(&first.z)
+    } else {
         // The velocity v = H_p is fixed: H_pp δp = −∂H_p/∂a.
-        Form::Hamiltonian => {
-            model.first(time, &still(q), &still(p), &mut first);
-            let (mut plain, mut zz) = (First::ZERO, [[0.0; N]; N]);
-            model.first_and_mass(t, q, p, &mut plain, &mut zz);
-            let right = DVector::from_fn(N, |a, _| -first.z[a].slope);
-            let found = DMatrix::from_fn(N, N, |a, b| zz[a][b]).lu().solve(&right);
-            found.map_or([f64::NAN; N], |found| std::array::from_fn(|a| found[a]))
-        }
+        model.first(time, &still(q), &still(p), &mut first);
+        let (mut plain, mut zz) = (First::ZERO, [[0.0; N]; N]);
+        model.first_and_mass(t, q, p, &mut plain, &mut zz);
+        balancing(&zz, &slopes(&first.z))
     }
+}
+
+/// The change of momenta that balances a change of velocities; NaN if the second derivative by the momenta is singular.
+fn balancing<const N: usize>(zz: &[[f64; N]; N], change: &[f64; N]) -> [f64; N] {
+    let right = DVector::from_fn(N, |a, _| -change[a]);
+    let found = square(zz).lu().solve(&right);
+    found.map_or([f64::NAN; N], |found| std::array::from_fn(|a| found[a]))
 }

@@ -47,21 +47,30 @@ impl<M: Model<N>, const N: usize> Varied<N, FixedLength> for M {
         };
         let mut first = First::ZERO;
         self.first(node.t, &node.q, z, &mut first);
-        let sign = sign(M::FORM);
-        let mut push: [f64; N] = std::array::from_fn(|a| sign * first.q[a] + first.force[a]);
+        let mut push = pushed(sign(M::FORM), &first);
         if const { !M::CONSTRAINTS.is_empty() } {
             let at = (&node.q, &node.p);
             let reactions = Evaluate::<N, FixedLength>::reactions(self, node.t, at, &node.v);
             let mut rows = vec![[0.0; N]; reactions.len()];
             let mut drift = vec![0.0; reactions.len()];
             self.constraint_rows(node.t, &node.q, &mut rows, &mut drift);
-            for (row, reaction) in rows.iter().zip(&reactions) {
-                for (push, entry) in push.iter_mut().zip(row) {
-                    *push += entry * reaction;
-                }
-            }
+            add_reactions(&mut push, &rows, &reactions);
         }
         push
+    }
+}
+
+/// dp/dt without reactions of constraints.
+fn pushed<const N: usize>(sign: f64, first: &First<f64, N>) -> [f64; N] {
+    std::array::from_fn(|a| sign * first.q[a] + first.force[a])
+}
+
+/// Adds Aᵀλ.
+fn add_reactions<const N: usize>(push: &mut [f64; N], rows: &[[f64; N]], reactions: &[f64]) {
+    for (row, reaction) in rows.iter().zip(reactions) {
+        for (push, entry) in push.iter_mut().zip(row) {
+            *push += entry * reaction;
+        }
     }
 }
 
