@@ -235,7 +235,7 @@ where
         // The direction of the first span of nonzero length.
         let chosen = (reached.step).or_else(|| (length > 0.0).then_some(length / 1000.0));
         let step = chosen.unwrap_or(0.0);
-        let (mesh, done, origin) = reached.place(end, None, |span, _| {
+        let (mesh, done, origin) = reached.place(end, None, &|span, _| {
             Mesh::new(span, step, &ensemble.breaks, &[])
         })?;
         let next = Reached::new((origin, reached.direction), chosen, &mesh, end);

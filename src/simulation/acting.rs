@@ -1,5 +1,6 @@
-//! Selects the impulses that act at the start of an element, or before a time inside it.
+//! Selects the impulses that act at the start of an element, inside it, or before a time inside it.
 
+use super::mesh::within;
 use crate::motion::is_same_time;
 use tfe_runtime::step::Impulse;
 
@@ -21,4 +22,35 @@ pub(super) fn kick(impulses: &[(f64, Vec<f64>)], (t, h): (f64, f64), momenta: &m
 pub(super) fn behind<const N: usize>(impulses: &[Impulse<N>], time: f64, h: f64) -> usize {
     let is_ahead = |impulse: &Impulse<N>| h.signum() * impulse.time >= h.signum() * time;
     impulses.iter().take_while(|one| !is_ahead(one)).count()
+}
+
+/// The impulses that act in the element from `t` to `next`.
+pub(super) fn inside<const N: usize>(
+    impulses: &[Impulse<N>],
+    (t, next): (f64, f64),
+) -> Vec<Impulse<N>> {
+    let acts = |impulse: &&Impulse<N>| within(impulse.time, t, next);
+    impulses.iter().filter(acts).copied().collect()
+}
+
+/// Adds those of the impulses, from the first on, that act at time t to the momenta; subtracts them if h < 0. Returns
+/// their number.
+pub(super) fn kick_at<const N: usize>(
+    impulses: &[Impulse<N>],
+    (t, h): (f64, f64),
+    momenta: &mut [f64; N],
+) -> usize {
+    let is_here = |impulse: &&Impulse<N>| is_same_time(impulse.time, t);
+    let count = impulses.iter().take_while(is_here).count();
+    for impulse in &impulses[..count] {
+        for (p, change) in momenta.iter_mut().zip(impulse.value) {
+            *p += h.signum() * change;
+        }
+    }
+    count
+}
+
+/// Removes the impulses at a time.
+pub(super) fn remove_at<const N: usize>(impulses: &mut Vec<Impulse<N>>, time: f64) {
+    impulses.retain(|impulse| impulse.time != time);
 }

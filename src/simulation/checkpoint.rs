@@ -1,12 +1,16 @@
 //! Continuation of runs from checkpoints.
 
 use super::kind::Simulated;
-use super::mesh::Mesh;
+use super::mesh::{Grid, Mesh};
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::Length;
 use crate::motion::{Checkpoint, Motion, Node, Reached};
 use std::ops::Range;
+
+/// Divides a span into elements, through nodes if there are any.
+type Meshing<'a, const N: usize> =
+    dyn Fn(&Range<f64>, Option<&[f64]>) -> Result<Mesh<N>, RunErrorKind> + 'a;
 
 impl Reached {
     /// The end of a run over a mesh with an origin, of which `done` elements were done at the end of the run before.
@@ -55,7 +59,7 @@ impl Reached {
         &self,
         end: f64,
         nodes: Option<&[f64]>,
-        mut mesh: impl FnMut(&Range<f64>, Option<Vec<f64>>) -> Result<Mesh<N>, RunErrorKind>,
+        mesh: &Meshing<'_, N>,
     ) -> Result<(Mesh<N>, usize, f64), RunErrorKind> {
         let Self {
             origin,
@@ -66,8 +70,8 @@ impl Reached {
         if let Some(nodes) = nodes {
             let is_ahead = |node: &&f64| (end - time) * (**node - time) > 0.0;
             let ahead = nodes.iter().filter(is_ahead).copied();
-            let nodes = std::iter::once(time).chain(ahead).collect();
-            return Ok((mesh(&(time..end), Some(nodes))?, 0, time));
+            let nodes: Vec<f64> = std::iter::once(time).chain(ahead).collect();
+            return Ok((mesh(&(time..end), Some(&nodes))?, 0, time));
         }
         let on_grid = mesh(&(origin..end), None).ok().filter(|mesh| {
             match mesh.elements().nth(elements) {
@@ -127,28 +131,30 @@ where
         let direction = checkpoint.reached.direction;
         let prepare = || -> Result<_, RunErrorKind> {
             self.check_start(state)?;
-            let mut run = self.clone();
-            run.step = run.step.or(checkpoint.reached.step);
+            let step = self.step.or(checkpoint.reached.step);
             // At the checkpoint itself, impulses have acted if the run continues in the same direction. In a first run
             // none has, and in backward integration all of them are still to be subtracted.
+            let mut impulses = self.impulses.clone();
             if (end - time) * direction > 0.0 {
-                M::leave_behind(&mut run.impulses, time);
+                M::leave_behind(&mut impulses, time);
             }
             let suspended = checkpoint.stepper.clone();
             let is_same = self.model.is_that_of(&suspended);
             let mut stepper = M::resumed(self.model.clone(), self.chosen(), suspended)?;
             M::check_velocity(&mut stepper, (time, state))?;
-            let place = checkpoint
-                .reached
-                .place(end, self.nodes.as_deref(), |span, nodes| {
-                    run.nodes = nodes;
-                    // A new grid begins behind the impulses that lie before it.
-                    let mut run = run.clone();
-                    let direction = (end - span.start).signum();
-                    let is_behind = |time: f64| direction * time < direction * span.start;
-                    run.impulses.retain(|one| !is_behind(M::time_of(one)));
-                    run.mesh(span)
-                })?;
+            let mesh = |span: &Range<f64>, nodes: Option<&[f64]>| {
+                // A new grid begins behind the impulses that lie before it.
+                let impulses = ahead(&impulses, M::time_of, span);
+                let grid = Grid {
+                    step,
+                    nodes,
+                    breaks: &self.breaks,
+                    impulses: &impulses,
+                };
+                M::mesh(span, &grid)
+            };
+            let nodes = self.nodes.as_deref();
+            let place = checkpoint.reached.place(end, nodes, &mesh)?;
             // A checkpoint without elements was never checked.
             if !is_same || direction == 0.0 {
                 self.check_constraints_at((&place.0, place.1), (time, state))?;
@@ -181,18 +187,11 @@ where
         checkpoint: &Checkpoint<N, L>,
         stepper: &mut L::Stepper<'_, M>,
     ) -> Node<N, L> {
-        /// The largest relative difference of two velocities that is attributed to the iteration.
-        const SAME: f64 = 1e-9;
-
         let (time, state) = (checkpoint.time(), &checkpoint.state);
         let known = &checkpoint.velocity;
         if const { M::FACTS.time_dependent } {
             let found = M::node(stepper, &*self.model, (time, state), known);
-            let both = || found.v.as_ref().iter().zip(known.as_ref());
-            let largest = both().fold(0.0_f64, |most, (a, b)| most.max(a.abs()).max(b.abs()));
-            let is_same =
-                |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * largest || a.is_nan() && b.is_nan();
-            if !both().all(is_same) {
+            if !is_same_velocity(found.v.as_ref(), known.as_ref()) {
                 return found;
             }
         }
@@ -210,4 +209,24 @@ where
             None => Ok(()),
         }
     }
+}
+
+/// Whether two velocities differ by no more than iterations leave.
+fn is_same_velocity(found: &[f64], known: &[f64]) -> bool {
+    /// The largest relative difference that is attributed to the iteration.
+    const SAME: f64 = 1e-9;
+
+    let both = || found.iter().zip(known);
+    let largest = both().fold(0.0_f64, |most, (a, b)| most.max(a.abs()).max(b.abs()));
+    let is_same =
+        |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * largest || a.is_nan() && b.is_nan();
+    both().all(is_same)
+}
+
+/// The impulses that do not lie before a span.
+fn ahead<I: Clone>(impulses: &[I], time: fn(&I) -> f64, span: &Range<f64>) -> Vec<I> {
+    let direction = (span.end - span.start).signum();
+    let is_behind = |impulse: &&I| direction * time(impulse) < direction * span.start;
+    let ahead = impulses.iter().filter(|impulse| !is_behind(impulse));
+    ahead.cloned().collect()
 }

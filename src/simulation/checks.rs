@@ -39,10 +39,16 @@ pub(super) fn check_finite(q: &[f64], p: &[f64]) -> Result<(), RunErrorKind> {
     Ok(())
 }
 
-/// Refuses impulses of which one has a time or components that are not finite.
-pub(super) fn check_impulses<const N: usize>(impulses: &[Impulse<N>]) -> Result<(), RunErrorKind> {
-    let mut impulses = impulses.iter();
-    impulses.try_for_each(|one| check_impulse(one.time, &one.value))
+/// Refuses a start, or impulses, with a time or components that are not finite.
+pub(super) fn check_run<const N: usize>(
+    start: &State<N>,
+    impulses: &[Impulse<N>],
+) -> Result<(), RunErrorKind> {
+    check_start(start)?;
+    for impulse in impulses {
+        check_impulse(impulse.time, &impulse.value)?;
+    }
+    Ok(())
 }
 
 /// Refuses an impulse with a time or components that are not finite.

@@ -142,15 +142,8 @@ impl<const N: usize> Ordered<N> {
     /// The impulses of a run over a span, all of which are known to lie in it.
     pub(super) fn of(impulses: &[Impulse<N>], span: &Range<f64>) -> Self {
         let direction = direction_of(span);
-        let (mut times, mut ordered) = (Vec::new(), Vec::with_capacity(impulses.len()));
-        for impulse in impulses {
-            times.push(impulse.time);
-        }
-        for place in order(&times, direction) {
-            ordered.push(impulses[place]);
-        }
         Self {
-            impulses: ordered,
+            impulses: in_order(impulses, |impulse| impulse.time, direction),
             direction,
         }
     }
@@ -187,6 +180,18 @@ pub(crate) fn within(time: f64, t: f64, next: f64) -> bool {
     } else {
         t >= time && time > next
     }
+}
+
+/// Impulses of any kind in the order in which a run in this direction passes them.
+pub(super) fn in_order<I: Clone>(impulses: &[I], time: fn(&I) -> f64, direction: f64) -> Vec<I> {
+    let (mut times, mut ordered) = (Vec::new(), Vec::with_capacity(impulses.len()));
+    for impulse in impulses {
+        times.push(time(impulse));
+    }
+    for place in order(&times, direction) {
+        ordered.push(impulses[place].clone());
+    }
+    ordered
 }
 
 /// The indices of times in the order in which a run passes them; the order of equal times is kept.

@@ -3,6 +3,7 @@
 use super::course::{Course, Leg};
 use super::follow::Follow;
 use super::kind::Simulated;
+use super::mesh::in_order;
 use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
 use super::resolution::{Again, Examined, Resolution};
 use super::times::Endless;
@@ -74,8 +75,7 @@ where
     ) -> Self {
         if let Ok((_, elements, _)) = &beginning {
             let (.., h, _) = elements.element();
-            let place = |impulse: &L::Impulse| h.signum() * M::time_of(impulse);
-            impulses.sort_by(|a, b| place(a).total_cmp(&place(b)));
+            impulses = in_order(&impulses, M::time_of, h.signum());
         }
         let (way, pieces) = match beginning {
             Ok((stepper, elements, pieces)) => (Ok((stepper, elements)), pieces.map(Box::new)),

@@ -1,16 +1,17 @@
 //! Runs of models of fixed size.
 
+use super::super::acting;
 use super::super::checks::{
-    check_constraints, check_impulses, check_start, conserves_energy, may_be_of_first_order,
+    check_constraints, check_run, check_start, conserves_energy, may_be_of_first_order,
 };
 use super::super::masses::mass_signs;
-use super::super::mesh::{Grid, Mesh, within};
+use super::super::mesh::{Grid, Mesh};
 use super::super::watch::Watch;
 use super::{Chosen, Simulated, second};
 use crate::error::RunErrorKind;
 use crate::evaluate::names;
 use crate::length::FixedLength;
-use crate::motion::{Motion, Node, Warning, is_same_time};
+use crate::motion::{Motion, Node, Warning};
 use crate::sensitivity::slopes::momentum_by;
 use std::ops::Range;
 use tfe_runtime::constrained::{self, Trail};
@@ -27,11 +28,21 @@ fn cutting<'m, M: Model<N>, const N: usize>(
     stepper: Result<Stepper<'m, M, N>, ModelError>,
     at_kinks: bool,
 ) -> Result<Stepper<'m, M, N>, RunErrorKind> {
-    let stepper = stepper.map_err(RunErrorKind::of_stepper)?;
-    Ok(match at_kinks {
-        true => stepper.at_kinks(),
-        false => stepper,
-    })
+    match stepper {
+        Ok(stepper) if at_kinks => Ok(stepper.at_kinks()),
+        Ok(stepper) => Ok(stepper),
+        Err(error) => Err(RunErrorKind::of_stepper(error)),
+    }
+}
+
+/// Whether the least and largest numbers that were reached lie within bounds.
+#[inline]
+fn lie_within(reached: &[(f64, f64)], bounds: &[(f64, f64)]) -> bool {
+    let mut are_within = bounds.len() == reached.len();
+    for ((low, high), (from, to)) in bounds.iter().zip(reached) {
+        are_within &= low <= from && to <= high;
+    }
+    are_within
 }
 
 impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
@@ -81,9 +92,10 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     }
 
     fn check_start(&self, start: &State<N>, impulses: &[Impulse<N>]) -> Result<(), RunErrorKind> {
-        self.check().map_err(RunErrorKind::Family)?;
-        check_start(start)?;
-        check_impulses(impulses)
+        match self.check() {
+            Ok(()) => check_run(start, impulses),
+            Err(error) => Err(RunErrorKind::Family(error)),
+        }
     }
 
     fn check_first(&self, (t, h): (f64, f64), start: &State<N>) -> Result<(), RunErrorKind> {
@@ -96,7 +108,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
 
     fn leave_behind(impulses: &mut Vec<Impulse<N>>, t: f64) {
         // Impulses at the end of a run act in its last element.
-        impulses.retain(|impulse| impulse.time != t);
+        acting::remove_at(impulses, t);
     }
 
     fn first_node(
@@ -184,16 +196,10 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
 
     #[inline(always)]
     fn reaches_within(stepper: &mut Stepper<'_, M, N>, bounds: &[(f64, f64)]) -> bool {
-        let (Some(reach), Some((q, z))) = (stepper.reach(), bounds.split_at_checked(N)) else {
-            return false;
-        };
-        let mut is_within = q.len() == N && z.len() == N;
-        for (bounds, reached) in [(q, &reach.q), (z, &reach.z)] {
-            for ((low, high), (from, to)) in bounds.iter().zip(reached) {
-                is_within &= low <= from && to <= high;
-            }
+        match (stepper.reach(), bounds.split_at_checked(N)) {
+            (Some(reach), Some((q, z))) => lie_within(&reach.q, q) && lie_within(&reach.z, z),
+            _ => false,
         }
-        is_within
     }
 
     fn outputs_within(&self, bounds: &[Enclosure], values: &mut [Enclosure]) -> bool {
@@ -241,9 +247,8 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         stepper.statistics()
     }
 
-    fn acting(impulses: &[Impulse<N>], (t, next): (f64, f64)) -> Vec<Impulse<N>> {
-        let acts = |impulse: &&Impulse<N>| within(impulse.time, t, next);
-        impulses.iter().filter(acts).copied().collect()
+    fn acting(impulses: &[Impulse<N>], nodes: (f64, f64)) -> Vec<Impulse<N>> {
+        acting::inside(impulses, nodes)
     }
 
     fn kick(&self, _: &[Impulse<N>], _: (f64, f64), _: &mut State<N>) -> bool {
@@ -251,17 +256,13 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
     }
 
     fn kick_at(&self, impulses: &[Impulse<N>], (t, h): (f64, f64), state: &mut State<N>) -> usize {
-        let is_here = |impulse: &&Impulse<N>| is_same_time(impulse.time, t);
-        let count = impulses.iter().take_while(is_here).count();
-        for impulse in &impulses[..count] {
-            for (p, change) in state.p.iter_mut().zip(impulse.value) {
-                *p += h.signum() * change;
-            }
-        }
+        let count = acting::kick_at(impulses, (t, h), &mut state.p);
         if const { !M::CONSTRAINTS.is_empty() } && count > 0 {
             // Constraints react at once to the part of the impulses that violates them.
-            let velocity = self.allowed_velocity(t, state, &[0.0; N]);
-            state.p = velocity.map_or([f64::NAN; N], |v| Simulated::momenta(self, t, &state.q, &v));
+            state.p = match self.allowed_velocity(t, state, &[0.0; N]) {
+                Some(v) => Simulated::momenta(self, t, &state.q, &v),
+                None => [f64::NAN; N],
+            };
         }
         count
     }
