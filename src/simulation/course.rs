@@ -3,10 +3,18 @@
 use super::times::Endless;
 use crate::error::RunErrorKind;
 
-/// A stepper with the elements to come, or the error at which it ended, until that has been returned.
+/// A stepper with the elements to come.
 #[derive(Debug)]
 pub(super) struct Course<S> {
-    way: Result<(S, Endless), Option<RunErrorKind>>,
+    /// `None` once the sequence has ended.
+    stepper: Option<S>,
+    legs: Legs,
+}
+
+/// The elements to come, or the error at which the sequence ended, until that has been returned.
+#[derive(Debug)]
+struct Legs {
+    elements: Result<Endless, Option<RunErrorKind>>,
     element: usize,
 }
 
@@ -21,72 +29,75 @@ pub(super) struct Leg {
     pub(super) nodes: (f64, f64),
 }
 
-impl<S> Course<S> {
-    pub(super) fn new(way: Result<(S, Endless), RunErrorKind>) -> Self {
-        Self {
-            way: way.map_err(Some),
-            element: 0,
-        }
-    }
-
-    /// The stepper, unless the course has ended.
-    pub(super) fn stepper(&self) -> Option<&S> {
-        self.way.as_ref().ok().map(|(stepper, _)| stepper)
-    }
-
-    /// The stepper, mutable.
-    pub(super) fn stepper_mut(&mut self) -> Option<&mut S> {
-        self.way.as_mut().ok().map(|(stepper, _)| stepper)
-    }
-
-    /// The start of the next element, unless the sequence has ended.
-    pub(super) fn time(&self) -> Option<f64> {
-        let (_, elements) = self.way.as_ref().ok()?;
-        let (time, ..) = elements.element();
-        Some(time)
-    }
-
-    /// Calls `advance` on the next element; if that fails, the stepper is passed to `ended`.
-    pub(super) fn next<T>(
-        &mut self,
-        advance: impl FnOnce(&mut S, &Leg) -> Result<T, RunErrorKind>,
-        ended: impl FnOnce(&S),
-    ) -> Option<Result<T, RunErrorKind>> {
-        let (stepper, elements) = match &mut self.way {
-            Ok(way) => way,
-            Err(failure) => return failure.take().map(Err),
-        };
+impl Legs {
+    fn next(&self) -> Option<Leg> {
+        let elements = self.elements.as_ref().ok()?;
         let (time, next, h, begin) = elements.element();
-        let leg = Leg {
+        Some(Leg {
             number: self.element,
             begin,
             h,
             nodes: (time, next),
+        })
+    }
+
+    fn advance(&mut self) {
+        if let Ok(elements) = &mut self.elements {
+            elements.advance();
+            self.element += 1;
+        }
+    }
+}
+
+impl<S> Course<S> {
+    pub(super) fn new(way: Result<(S, Endless), RunErrorKind>) -> Self {
+        let (stepper, elements) = match way {
+            Ok((stepper, elements)) => (Some(stepper), Ok(elements)),
+            Err(kind) => (None, Err(Some(kind))),
         };
-        match advance(stepper, &leg) {
-            Ok(found) => {
-                elements.advance();
-                self.element += 1;
-                Some(Ok(found))
-            }
-            Err(kind) => {
-                ended(stepper);
-                self.way = Err(None);
-                Some(Err(kind))
+        let legs = Legs {
+            elements,
+            element: 0,
+        };
+        Self { stepper, legs }
+    }
+
+    /// The stepper, unless the course has ended.
+    pub(super) fn stepper(&self) -> Option<&S> {
+        self.stepper.as_ref()
+    }
+
+    /// The stepper, mutable.
+    pub(super) fn stepper_mut(&mut self) -> Option<&mut S> {
+        self.stepper.as_mut()
+    }
+
+    /// The start of the next element, unless the sequence has ended.
+    pub(super) fn time(&self) -> Option<f64> {
+        Some(self.legs.next()?.nodes.0)
+    }
+
+    /// The stepper and the next element, unless the sequence has ended.
+    pub(super) fn begin(&mut self) -> Option<(&mut S, Leg)> {
+        match (&mut self.stepper, self.legs.next()) {
+            (Some(stepper), Some(leg)) => Some((stepper, leg)),
+            _ => None,
+        }
+    }
+
+    /// Goes on to the element after this one, or ends the sequence.
+    pub(super) fn end(&mut self, goes_on: bool) {
+        match goes_on {
+            true => self.legs.advance(),
+            false => {
+                self.stepper = None;
+                self.legs.elements = Err(None);
             }
         }
     }
 
     /// Takes the error at which the sequence ended.
     pub(super) fn failure(&mut self) -> Option<RunErrorKind> {
-        self.way.as_mut().err()?.take()
-    }
-
-    /// Ends the sequence without an error.
-    pub(super) fn stop(&mut self, ended: impl FnOnce(&S)) {
-        if let Ok((stepper, _)) = &self.way {
-            ended(stepper);
-            self.way = Err(None);
-        }
+        self.legs.elements.as_mut().err()?.take()
     }
 }

@@ -1,6 +1,6 @@
 //! The endless sequence of nodes of a run.
 
-use super::course::{Course, Leg};
+use super::course::Course;
 use super::follow::Follow;
 use super::kind::Simulated;
 use super::mesh::in_order;
@@ -102,33 +102,42 @@ where
             state,
             impulses,
             pieces,
-            statistics,
+            ..
         } = self;
         let Some(pieces) = pieces.as_mut() else {
             return course.failure().map(Err);
         };
         pieces.events.met.clear();
-        let advance = |stepper: &mut L::Stepper<'m, M>, leg: &Leg| {
-            let (t, next) = leg.nodes;
-            pieces.model.kick(impulses, (t, leg.h), state);
-            let impulses = M::acting(impulses, leg.nodes);
-            let planned = Planned {
-                number: leg.number,
-                t,
-                next,
-                h: leg.h,
-                begin: leg.begin,
-                impulses: &impulses,
-            };
-            let left = model.guarded(|| pieces.pass(stepper, planned, state, observer));
-            let left = left.ok_or(RunErrorKind::panicked(t))?;
-            left.map(|left| (left, next)).map_err(|broken| broken.kind)
+        let Some((stepper, leg)) = course.begin() else {
+            return course.failure().map(Err);
         };
-        let passed = course.next(advance, |stepper| *statistics = *M::statistics(stepper));
-        if let Some(Ok((Left::Stopped, _))) = passed {
-            course.stop(|stepper| *statistics = *M::statistics(stepper));
+        let (t, next) = leg.nodes;
+        pieces.model.kick(impulses, (t, leg.h), state);
+        let impulses = M::acting(impulses, leg.nodes);
+        let planned = Planned {
+            number: leg.number,
+            t,
+            next,
+            h: leg.h,
+            begin: leg.begin,
+            impulses: &impulses,
+        };
+        let left = model.guarded(|| pieces.pass(stepper, planned, state, observer));
+        let passed = match left {
+            Some(Ok(left)) => Ok((left, next)),
+            Some(Err(broken)) => Err(broken.kind),
+            None => Err(RunErrorKind::panicked(t)),
+        };
+        self.end(matches!(passed, Ok((Left::Done, _))));
+        Some(passed)
+    }
+
+    /// Goes on to the next element, or ends the sequence.
+    fn end(&mut self, goes_on: bool) {
+        if !goes_on && let Some(stepper) = self.course.stepper() {
+            self.statistics = *M::statistics(stepper);
         }
-        passed
+        self.course.end(goes_on);
     }
 
     pub(super) fn statistics(&self) -> Statistics {
@@ -229,6 +238,51 @@ where
         (self.way.pieces.as_ref()).map_or(&[], |pieces| &pieces.events.met)
     }
 
+    /// Solves a step in which no events are looked for; `None` if the sequence has ended.
+    fn pass_whole(&mut self) -> Option<Result<Node<N, L>, RunErrorKind>> {
+        let Way {
+            model,
+            course,
+            state,
+            impulses,
+            ..
+        } = &mut self.way;
+        let (stepper, leg) = course.begin()?;
+        let ((t, next), at) = (leg.nodes, (leg.nodes.0, leg.h));
+        let is_kicked = model.kick(impulses, at, state);
+        let impulses = M::acting(impulses, leg.nodes);
+        let has_impulses = is_kicked || !impulses.is_empty();
+        let before = state.clone();
+        model.look(&mut self.watch, leg.number, at, &before, false);
+        let velocity = &mut self.velocity;
+        let passed = model.guarded(|| {
+            M::advance(stepper, (leg.begin, leg.h), state, &impulses)?;
+            Ok(M::node(stepper, model, (next, state), velocity))
+        });
+        let node = match passed {
+            Some(Ok(node)) => node,
+            Some(Err(source)) => {
+                model.look(&mut self.watch, leg.number, at, &before, true);
+                return Some(Err(model.failed(leg.number, at, source)));
+            }
+            None => return Some(Err(RunErrorKind::panicked(t))),
+        };
+        velocity.clone_from(&node.v);
+        if !has_impulses {
+            let examined = Examined {
+                t,
+                h: leg.h,
+                before: &before,
+                after: state,
+            };
+            self.resolution.look(M::statistics(stepper), examined);
+        }
+        let is_conserved = !has_impulses && M::CONSERVES;
+        let recorded = Recorded::of(&**model, &node, is_conserved);
+        self.watch.pass(recorded, &|| model.rounding_at(&node));
+        Some(Ok(node))
+    }
+
     /// Solves a step and looks for events in it.
     fn look(&mut self) {
         let mut observer = Nodes {
@@ -279,51 +333,13 @@ where
             }
             return told;
         }
-        let Way {
-            model,
-            course,
-            state,
-            impulses,
-            statistics,
-            ..
-        } = &mut self.way;
-        let (watch, resolution) = (&mut self.watch, &mut self.resolution);
-        let velocity = &mut self.velocity;
-        let advance = |stepper: &mut L::Stepper<'_, M>, leg: &Leg| {
-            let (t, next) = leg.nodes;
-            let is_kicked = model.kick(impulses, (t, leg.h), state);
-            let impulses = M::acting(impulses, leg.nodes);
-            let has_impulses = is_kicked || !impulses.is_empty();
-            let before = state.clone();
-            model.look(watch, leg.number, (t, leg.h), &before, false);
-            let passed = model.guarded(|| {
-                M::advance(stepper, (leg.begin, leg.h), state, &impulses)?;
-                Ok(M::node(stepper, model, (next, state), velocity))
-            });
-            let node = match passed {
-                Some(Ok(node)) => node,
-                Some(Err(source)) => {
-                    model.look(watch, leg.number, (t, leg.h), &before, true);
-                    return Err(model.failed(leg.number, (t, leg.h), source));
-                }
-                None => return Err(RunErrorKind::panicked(t)),
-            };
-            velocity.clone_from(&node.v);
-            if !has_impulses {
-                let examined = Examined {
-                    t,
-                    h: leg.h,
-                    before: &before,
-                    after: state,
-                };
-                resolution.look(M::statistics(stepper), examined);
+        match self.pass_whole() {
+            Some(passed) => {
+                self.way.end(passed.is_ok());
+                Some(passed)
             }
-            let is_conserved = !has_impulses && M::CONSERVES;
-            let recorded = Recorded::of(&**model, &node, is_conserved);
-            watch.pass(recorded, &|| model.rounding_at(&node));
-            Ok(node)
-        };
-        course.next(advance, |stepper| *statistics = *M::statistics(stepper))
+            None => self.way.course.failure().map(Err),
+        }
     }
 }
 
