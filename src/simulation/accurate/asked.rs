@@ -63,7 +63,8 @@ where
     /// # }
     /// ```
     #[must_use]
-    pub fn accuracy(self, accuracy: f64) -> Accurate<Self> {
+    pub fn accuracy(mut self, accuracy: f64) -> Accurate<Self> {
+        self.at_kinks.get_or_insert(true);
         Accurate::new(self, accuracy)
     }
 
@@ -147,9 +148,7 @@ where
         start: L::State,
         span: Range<f64>,
     ) -> Result<Estimated<Motion<N, L>>, RunError<N, L>> {
-        let mut run = self.simulation.clone();
-        run.at_kinks.get_or_insert(true);
-        let run = &run;
+        let run = &self.simulation;
         let at_start = (span.start, &start);
         if span.start == span.end {
             if let Err(kind) = check_accuracy(self.accuracy) {
