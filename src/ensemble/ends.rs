@@ -10,6 +10,9 @@ use tfe_runtime::Statistics;
 /// The end of a run, or the error that stopped it.
 pub(super) type Outcome<const N: usize, L> = Result<Node<N, L>, RunErrorKind>;
 
+/// Called with the index of a run that has ended, and its end.
+pub(super) type Finished<'a, const N: usize, L> = dyn Fn(usize, Outcome<N, L>) + Send + Sync + 'a;
+
 /// The results of an [`Ensemble`](crate::Ensemble), in the order of its starts.
 ///
 /// `ends[k]` is the result of run k: the node at the end of the span, or why the run stopped before.

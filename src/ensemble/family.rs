@@ -86,6 +86,6 @@ where
         Mesh::<0>::new(&span, step, &self.breaks, &[])?;
         self.element.validate().map_err(RunErrorKind::Element)?;
         let progress = Progress::new(self.progress, count, "runs");
-        Ok(self.run_one_by_one(starts, &span, (count, &progress), finished))
+        Ok(self.run_one_by_one(starts, &span, (count, &progress), &finished))
     }
 }

@@ -54,7 +54,7 @@ impl<const N: usize> Plan<N> {
         bundle: &mut Bundle<'m, M, N, WIDTH, T>,
         count: usize,
         failures: &mut Failures,
-        finished: impl Fn(usize, Result<Node<N>, RunErrorKind>),
+        finished: &dyn Fn(usize, Result<Node<N>, RunErrorKind>),
     ) -> Statistics
     where
         M: Model<N>,

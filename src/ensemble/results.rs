@@ -50,30 +50,36 @@ pub(super) fn unlock<T>(place: Mutex<T>) -> T {
     place.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Solves batches, given by their numbers, in a place of its own.
+type Solving<'a> = Box<dyn FnMut(usize) -> Statistics + 'a>;
+
 /// Adds up the work of all batches. A place that `place` creates is used for many of them, one after the other.
-#[cfg(feature = "parallel")]
 pub(super) fn summed<P>(
     batches: usize,
     place: impl Fn() -> P + Send + Sync,
     batch: impl Fn(&mut P, usize) -> Statistics + Send + Sync,
 ) -> Statistics {
+    let batch = &batch;
+    total(batches, &|| {
+        let mut place = place();
+        Box::new(move |number: usize| batch(&mut place, number))
+    })
+}
+
+/// The same, compiled once, and not for every model.
+#[cfg(feature = "parallel")]
+fn total<'a>(batches: usize, begin: &(dyn Fn() -> Solving<'a> + Send + Sync)) -> Statistics {
     use rayon::iter::{IntoParallelIterator, ParallelIterator};
     (0..batches)
         .into_par_iter()
-        .map_init(place, batch)
+        .map_init(begin, |solve, number| solve(number))
         .reduce(Statistics::default, merged)
 }
 
 #[cfg(not(feature = "parallel"))]
-pub(super) fn summed<P>(
-    batches: usize,
-    place: impl Fn() -> P,
-    batch: impl Fn(&mut P, usize) -> Statistics,
-) -> Statistics {
-    let mut place = place();
-    (0..batches)
-        .map(|number| batch(&mut place, number))
-        .fold(Statistics::default(), merged)
+fn total<'a>(batches: usize, begin: &(dyn Fn() -> Solving<'a> + Send + Sync)) -> Statistics {
+    let solve = begin();
+    (0..batches).map(solve).fold(Statistics::default(), merged)
 }
 
 fn merged(mut sum: Statistics, other: Statistics) -> Statistics {

@@ -1,6 +1,6 @@
 //! The definition of an ensemble, and its runs.
 
-use super::ends::Ends;
+use super::ends::{Ends, Finished};
 use super::error::EnsembleError;
 use super::members::{ManyModels, Members, OneModel, some_starts};
 use super::plan::{Plan, WIDTH, bad_starts, start_of};
@@ -243,7 +243,7 @@ where
         let count = self.models.count(starts.len())?;
         let results = Mutex::new(Results::new(count));
         let from = span.start;
-        let statistics = self.for_each(starts, span, |index, result| {
+        let statistics = self.each(starts, span, &|index, result| {
             let model = self.models.model(index);
             let warnings = self.doubts(model, (from, start_of(starts, index)), &result);
             lock(&results).put(index, result, warnings);
@@ -289,6 +289,16 @@ where
     where
         F: Fn(usize, Result<Node<N>, RunErrorKind>) + Send + Sync,
     {
+        self.each(starts, span, &finished)
+    }
+
+    /// [`for_each`](Self::for_each), compiled once for a model.
+    fn each(
+        &self,
+        starts: &[State<N>],
+        span: Range<f64>,
+        finished: &Finished<'_, N, FixedLength>,
+    ) -> Result<Statistics, EnsembleError> {
         let count = self.models.count(starts.len())?;
         let step = self.step_over(&span);
         let mesh = Mesh::new(&span, step, &self.breaks, &[])?;
@@ -317,11 +327,10 @@ where
                 let starts = some_starts(starts, from, count);
                 self.models.place(bundle, from, &starts);
                 let mut failures = bad_starts(&starts);
-                let statistics =
-                    plan.drive_together(bundle, starts.len(), &mut failures, |lane, result| {
-                        finished(from + lane, result);
-                    });
-                progress.advance(starts.len());
+                let finished = |lane: usize, result| finished(from + lane, result);
+                let count = starts.len();
+                let statistics = plan.drive_together(bundle, count, &mut failures, &finished);
+                progress.advance(count);
                 statistics
             };
             summed(count.div_ceil(WIDTH), || empty.clone(), batch)

@@ -101,7 +101,7 @@ where
             return self.begin_one_by_one(starts, t0);
         }
         let width = self.width();
-        self.begin_with(starts, t0, width, |first, count| {
+        self.begin_with(starts, t0, width, &|first, count| {
             let starts = match width {
                 WIDTH => some_starts(starts, first, count),
                 _ => vec![*start_of(starts, first)],
@@ -162,7 +162,7 @@ where
         starts: &[L::State],
         t0: f64,
     ) -> Result<EnsembleRun<'m, M, N, K, L>, EnsembleError> {
-        self.begin_with(starts, t0, 1, |index, _| {
+        self.begin_with(starts, t0, 1, &|index, _| {
             Box::new(Resumed::At(t0, start_of(starts, index).clone()))
         })
     }
@@ -173,16 +173,24 @@ where
         starts: &[L::State],
         t0: f64,
         width: usize,
-        batch: impl Fn(usize, usize) -> AnyBatch<'m, M, N, K, L>,
+        batch: &dyn Fn(usize, usize) -> AnyBatch<'m, M, N, K, L>,
     ) -> Result<EnsembleRun<'m, M, N, K, L>, EnsembleError> {
         let count = self.models.count(starts.len())?;
         self.element.validate().map_err(RunErrorKind::Element)?;
-        let energy = |index| {
+        let mut energies = Vec::with_capacity(count);
+        for index in 0..count {
             let (model, start) = (self.models.model(index), start_of(starts, index));
-            let is_good = model.check_start(start, &[]).is_ok();
-            let energy = model.guarded(|| is_good.then(|| Energy::of(model, t0, start)));
-            energy.flatten().unwrap_or(Energy::UNKNOWN)
-        };
+            energies.push(match model.check_start(start, &[]) {
+                Ok(()) => model
+                    .guarded(|| Energy::of(model, t0, start))
+                    .unwrap_or(Energy::UNKNOWN),
+                Err(_) => Energy::UNKNOWN,
+            });
+        }
+        let mut batches = Vec::with_capacity(count.div_ceil(width));
+        for first in (0..count).step_by(width) {
+            batches.push(batch(first, count));
+        }
         Ok(EnsembleRun {
             ensemble: self.clone(),
             reached: Reached {
@@ -192,12 +200,9 @@ where
                 time: t0,
                 direction: 0.0,
             },
-            batches: (0..count)
-                .step_by(width)
-                .map(|first| batch(first, count))
-                .collect(),
+            batches,
             width,
-            energies: (0..count).map(energy).collect(),
+            energies,
         })
     }
 }
@@ -248,10 +253,10 @@ where
             done,
             width: *width,
         };
-        let places: Vec<_> = std::mem::take(batches)
-            .into_iter()
-            .map(Mutex::new)
-            .collect();
+        let mut places = Vec::with_capacity(batches.len());
+        for batch in batches {
+            places.push(Mutex::new(batch));
+        }
         let count = energies.len();
         let results = Mutex::new((Results::new(count), energies));
         let progress = Progress::new(ensemble.progress, count, "runs");
@@ -282,7 +287,6 @@ where
                 statistics
             },
         );
-        *batches = places.into_iter().map(unlock).collect();
         *reached = next;
         let (results, _) = unlock(results);
         Ok(results.into_ends(statistics))

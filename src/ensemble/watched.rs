@@ -1,7 +1,7 @@
 //! Ensembles whose runs look for events or are cut at kinks.
 
 use super::doubts::{Energy, WarningCounts};
-use super::ends::Outcome;
+use super::ends::{Finished, Outcome};
 use super::members::Models;
 use super::plan::start_of;
 use super::results::summed;
@@ -67,7 +67,7 @@ where
         starts: &[L::State],
         span: &Range<f64>,
         (count, progress): (usize, &Progress),
-        finished: impl Fn(usize, Outcome<N, L>) + Send + Sync,
+        finished: &Finished<'_, N, L>,
     ) -> Statistics {
         summed(
             count,
