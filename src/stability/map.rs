@@ -11,6 +11,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 /// A stability map: the spectral radius, or another measure of instability, over a rectangle of two parameters x and
 /// y.
@@ -201,15 +202,31 @@ fn cell(range: &Range<f64>, value: f64, count: usize) -> Option<usize> {
     Some(((fraction * count as f64) as usize).min(count - 1))
 }
 
-#[cfg(feature = "parallel")]
+/// The results of a function of all rows.
 fn each_row<T: Send>(rows: usize, row: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let mut places = Vec::with_capacity(rows);
+    places.resize_with(rows, || Mutex::new(None));
+    for_each_row(rows, &|number| {
+        let found = row(number);
+        *places[number]
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner) = Some(found);
+    });
+    let found =
+        |place: Mutex<Option<T>>| place.into_inner().unwrap_or_else(PoisonError::into_inner);
+    places.into_iter().filter_map(found).collect()
+}
+
+/// Solves all rows; compiled once, and not for every map.
+#[cfg(feature = "parallel")]
+fn for_each_row(rows: usize, solve: &(dyn Fn(usize) + Sync)) {
     use rayon::iter::{IntoParallelIterator, ParallelIterator};
-    (0..rows).into_par_iter().map(&row).collect()
+    (0..rows).into_par_iter().for_each(solve);
 }
 
 #[cfg(not(feature = "parallel"))]
-fn each_row<T: Send>(rows: usize, row: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    (0..rows).map(row).collect()
+fn for_each_row(rows: usize, solve: &(dyn Fn(usize) + Sync)) {
+    (0..rows).for_each(solve);
 }
 
 /// The cells of one row.
