@@ -64,14 +64,14 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             bases,
             ..
         } = matrices;
-        let reduced = const { !M::CONSTRAINTS.is_empty() }.then(|| {
-            if transitions.is_empty() {
-                let start = motion.last();
-                return allowed::identity(tangents.basis(start.t, &start.state()));
-            }
-            let bases = bases.into_iter().collect::<Result<Vec<_>, _>>()?;
-            allowed::reduced(&bases, transitions.iter())
-        });
+        let reduced = if const { M::CONSTRAINTS.is_empty() } {
+            None
+        } else if transitions.is_empty() {
+            let start = motion.last();
+            Some(allowed::identity(tangents.basis(start.t, &start.state())))
+        } else {
+            Some(on_constraints(bases, &transitions))
+        };
         Ok(Linearised::with(motion, transitions, reduced))
     }
 }
@@ -135,4 +135,13 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Matrices<'m, M, N> {
     fn set(&mut self, model: &Share<'m, M>) -> Result<(), RunErrorKind> {
         self.tangents.set(model)
     }
+}
+
+/// The transition matrices, restricted to motions that the constraints allow, given the bases of these at their starts.
+fn on_constraints(
+    bases: Vec<Result<DMatrix<f64>, StepError>>,
+    transitions: &[DMatrix<f64>],
+) -> Result<Vec<DMatrix<f64>>, StepError> {
+    let bases = bases.into_iter().collect::<Result<Vec<_>, _>>()?;
+    allowed::reduced(&bases, transitions.iter())
 }
