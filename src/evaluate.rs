@@ -142,8 +142,10 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
 
     fn reactions(&self, t: f64, (q, p): (&[f64; N], &[f64; N]), velocity: &[f64; N]) -> Vec<f64> {
         let (q, p) = (*q, *p);
-        let reactions = constrained::reactions(self, t, &State { q, p }, velocity);
-        reactions.unwrap_or_else(|_| vec![f64::NAN; M::CONSTRAINTS.len()])
+        match constrained::reactions(self, t, &State { q, p }, velocity) {
+            Ok(reactions) => reactions,
+            Err(_) => vec![f64::NAN; M::CONSTRAINTS.len()],
+        }
     }
 
     fn with(&self, parameter: &str, value: f64) -> Option<Self> {

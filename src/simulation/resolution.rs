@@ -120,7 +120,8 @@ where
 
     /// Replaces the model.
     pub(super) fn set_model(&mut self, model: Share<'m, M>) {
-        (self.again.model, self.stepper) = (model, None);
+        self.again.model = model;
+        self.stepper = None;
     }
 
     /// Compares the element if it is due. Linear models are skipped: the error of their elements is known.
