@@ -376,7 +376,8 @@ where
     })
 }
 
-/// Newton's method for the z for which ∂/∂z equals a target.
+/// Newton's method for the z for which ∂/∂z equals a target. Inlined, so that the few numbers of a model with few
+/// coordinates stay in registers: [`conjugate`] stands in the iteration of elements.
 struct Search<'a, const N: usize> {
     target: &'a [f64; N],
     z: [f64; N],
@@ -389,6 +390,7 @@ struct Search<'a, const N: usize> {
 }
 
 impl<'a, const N: usize> Search<'a, N> {
+    #[cfg_attr(feature = "alloc", inline(always))]
     fn new(guess: &[f64; N], target: &'a [f64; N]) -> Self {
         Self {
             target,
@@ -402,6 +404,7 @@ impl<'a, const N: usize> Search<'a, N> {
 
     /// Makes a step, given ∂/∂z and ∂²/∂z∂z. Whether z is the solution: before the step, or after a step of at most the
     /// fraction `enough` of z.
+    #[cfg_attr(feature = "alloc", inline(always))]
     fn ends(
         &mut self,
         by_z: &[f64; N],
@@ -437,6 +440,7 @@ impl<'a, const N: usize> Search<'a, N> {
     }
 
     /// Makes a fraction of the step.
+    #[cfg_attr(feature = "alloc", inline(always))]
     fn advance(&mut self, fraction: f64) {
         for a in 0..N {
             self.z[a] = self.start[a] - fraction * self.step[a];
@@ -444,6 +448,7 @@ impl<'a, const N: usize> Search<'a, N> {
     }
 
     /// Whether the residual is less with this ∂/∂z than it was before the step, and not NaN.
+    #[cfg_attr(feature = "alloc", inline(always))]
     fn is_improved(&self, by_z: &[f64; N]) -> bool {
         distance(by_z, self.target) < self.residual
     }
