@@ -363,3 +363,28 @@ fn dependent_rows_are_refused() {
         "{message}"
     );
 }
+
+/// An initial state that violates constraints whose gradients have no squares is reported; formerly the first element
+/// projected it.
+#[cfg(feature = "sparse")]
+#[test]
+fn starts_beside_large_constraints_are_told() {
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
+        constraint(rod[i in 0..n]) = s*(x[i]^2 + y[i]^2 - 1)
+    )]
+    struct Rods {
+        n: usize,
+        s: f64,
+    }
+    for s in [1.0, 1e200] {
+        let rods = Rods { n: 2, s };
+        let start = FamilyState {
+            q: vec![1.0, 1.1, 0.0, 0.0],
+            p: vec![0.0; 4],
+        };
+        let run = Simulation::new(&rods).step(0.01).run(start, 0.0..0.1);
+        assert!(run.is_err(), "{s}");
+    }
+}

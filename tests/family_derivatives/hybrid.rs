@@ -166,6 +166,7 @@ where
         .element(Mixed::<8>)
         .on("wall", Crossing::Falling, bounce);
     PeriodicOrbit::of_simulation(&run)
+        .elements(12)
         .start_time(0.9)
         .period(TAU / OMEGA)
         .guess_from(guess)
@@ -181,6 +182,7 @@ where
         .element(Mixed::<8>)
         .on("wall", Crossing::Falling, bounce);
     PeriodicOrbit::of_simulation(&run)
+        .elements(12)
         .start_time(0.9)
         .period(TAU / OMEGA)
         .guess_from(guess)

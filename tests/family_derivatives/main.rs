@@ -1,5 +1,4 @@
 //! Derivatives of steps of models of run-time length: transition operators, their spectra, periodic orbits.
-#![cfg(feature = "sparse")]
 
 #[path = "../common/mod.rs"]
 mod common;

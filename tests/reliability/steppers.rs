@@ -119,31 +119,6 @@ fn constraints_of_any_size_count() {
     }
 }
 
-/// An initial state that violates constraints whose gradients have no squares is reported; formerly the first element
-/// projected it.
-#[cfg(feature = "sparse")]
-#[test]
-fn starts_beside_large_constraints_are_told() {
-    #[dynamics(
-        coordinates(x[n], y[n]),
-        lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2 - y[i]),
-        constraint(rod[i in 0..n]) = s*(x[i]^2 + y[i]^2 - 1)
-    )]
-    struct Rods {
-        n: usize,
-        s: f64,
-    }
-    for s in [1.0, 1e200] {
-        let rods = Rods { n: 2, s };
-        let start = tfe::family::FamilyState {
-            q: vec![1.0, 1.1, 0.0, 0.0],
-            p: vec![0.0; 4],
-        };
-        let run = Simulation::new(&rods).step(0.01).run(start, 0.0..0.1);
-        assert!(run.is_err(), "{s}");
-    }
-}
-
 /// A momentum that belongs to no velocity is refused as an initial state, even if constraints determine one.
 #[test]
 fn momenta_without_a_velocity_are_refused() {
