@@ -8,8 +8,8 @@
 //! ```
 //!
 //! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
-//! are treated in `norms.rs`, exponents in `exponents.rs`, exponentials in `exponentials.rs`, and sums whose terms have a
-//! limit only together in `together.rs`. This is done to the entries as a last step, after factors have been combined, so
+//! are treated in `norms.rs`, exponents in `exponents.rs`, exponentials in `exponentials.rs`, sums whose terms have a
+//! limit only together in `together.rs`, and products of signs and choices that jump at the same place in `sides.rs`. This is done to the entries as a last step, after factors have been combined, so
 //! that m/√m is √m and no choice is needed. Energies and outputs have the limits of norms and of quotients of exponentials
 //! only.
 
@@ -19,6 +19,7 @@ mod facts;
 mod norm;
 mod norms;
 mod powers;
+mod sides;
 mod together;
 
 use crate::derive::entry::Entry;
@@ -30,8 +31,9 @@ use crate::expr::rewrite::Mapping;
 use crate::program::Array;
 use exponentials::{over_exponentials, where_exponentials_vanish};
 use exponents::where_exponents_vanish;
-use facts::{factors_of, is_surely_positive};
+use facts::{factors_of, is_surely_positive, is_zero};
 use norms::Norms;
+use sides::take_limits_from_both_sides;
 use together::Together;
 
 /// The depth to which factors are searched for values that may be infinite.
@@ -51,6 +53,7 @@ pub(crate) fn take_limits<'a>(
             _ => {}
         }
     }
+    take_limits_from_both_sides(graph, &mut derivatives);
     // The signs in a force are as declared.
     rewrite(
         graph,
@@ -173,8 +176,7 @@ impl OrZero {
         else {
             return None;
         };
-        let is_zero = |x| graph.as_constant(x).is_some_and(Constant::is_zero);
-        let (holds, value) = match (is_zero(then), is_zero(otherwise)) {
+        let (holds, value) = match (is_zero(graph, then), is_zero(graph, otherwise)) {
             (false, true) => (true, then),
             (true, false) => (false, otherwise),
             _ => return None,

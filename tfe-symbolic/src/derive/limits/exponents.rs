@@ -4,7 +4,7 @@
 //! times infinity at x = 0. A whole exponent is an index, as in `sum(i in 0..N, a[i]*x^i)`, or a length. Of a whole
 //! exponent all whole factors count as such numbers, of another one those that are its multiples, but for a number.
 
-use super::facts::{factors_of, is_at_rest, moves};
+use super::facts::{factors_of, is_at_rest, is_zero, moves};
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::graph::{ExprId, Graph, Node};
@@ -127,7 +127,8 @@ fn multiple_of_fields(graph: &mut Graph, x: ExprId) -> Option<ExprId> {
 /// Whether a base may be zero: not where all that moves in it stands below, and not 1 + x².
 fn may_vanish(graph: &Graph, base: ExprId) -> bool {
     let factors = factors_of(graph, base);
-    (factors.iter()).any(|(y, n)| *n > 0 && moves(graph, *y) && !is_above_zero(graph, *y))
+    let vanishes = |(y, n): &(ExprId, i32)| *n > 0 && moves(graph, *y) && !is_above_zero(graph, *y);
+    is_zero(graph, base) || factors.iter().any(vanishes)
 }
 
 /// Whether it is the sum of a positive number and of even powers.

@@ -14,6 +14,11 @@ pub(super) fn factors_of(graph: &Graph, x: ExprId) -> Vec<(ExprId, i32)> {
     }
 }
 
+/// Whether an expression is the number zero.
+pub(super) fn is_zero(graph: &Graph, x: ExprId) -> bool {
+    graph.as_constant(x).is_some_and(Constant::is_zero)
+}
+
 /// u of ln u.
 pub(super) fn argument_of_logarithm(graph: &Graph, x: ExprId) -> Option<ExprId> {
     match graph.node(x) {
