@@ -16,6 +16,7 @@
 mod exponentials;
 mod exponents;
 mod facts;
+mod forms;
 mod norm;
 mod norms;
 mod powers;

@@ -1,6 +1,7 @@
 //! Norms, the degrees of expressions in them, and expressions with one in place of a norm.
 
 use super::facts::{argument_of_logarithm, factors_of, is_field};
+use super::forms::{Part, part, parts_of_form};
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
@@ -13,7 +14,11 @@ pub(super) const MAX_DEPTH: usize = 6;
 /// The depth to which sums are searched for terms that are infinite.
 pub(super) const MAX_SUMS: usize = 3;
 
-/// √(Σ c xᵢ²) with c > 0, also of one square, hypot(x₁, x₂) or |x|; or anything of which the logarithm is taken.
+/// The depth to which norms of norms are opened.
+const MAX_NESTING: usize = 3;
+
+/// √(Σ c xᵢ²) with c > 0, also of one square, or of another form that is positive definite; hypot(x₁, x₂) or |x|; or
+/// anything of which the logarithm is taken.
 #[derive(Clone)]
 pub(super) struct Norm {
     pub(super) root: Option<ExprId>,
@@ -25,22 +30,8 @@ pub(super) struct Norm {
     pub(super) is_plain: bool,
     /// Whether it may be negative.
     is_signed: bool,
-    /// The xᵢ as products, without the parameters among their factors.
-    parts: Vec<Vec<(ExprId, i32)>>,
-}
-
-/// The root of the factors of an expression without parameters, if they have one and it can vanish.
-fn part(graph: &Graph, x: ExprId, root: i32) -> Option<Vec<(ExprId, i32)>> {
-    let mut part = Vec::new();
-    for (y, n) in factors_of(graph, x) {
-        match graph.node(y) {
-            Node::Input(Input::Parameter(_) | Input::ParameterElement(..)) => {}
-            Node::Constant(_) => return None,
-            _ if n > 0 && n % root == 0 => part.push((y, n / root)),
-            _ => return None,
-        }
-    }
-    (!part.is_empty()).then_some(part)
+    /// The xᵢ. Those that are norms have their own parts behind them.
+    parts: Vec<Part>,
 }
 
 /// The sum in a product of parameters with one sum.
@@ -53,6 +44,25 @@ fn without_parameters(graph: &Graph, square: ExprId) -> Option<ExprId> {
         (Some((sum, 1)), None) if matches!(graph.node(*sum), Node::Sum { .. }) => Some(*sum),
         _ => None,
     }
+}
+
+/// The parts of a norm, and behind each that is a norm its own parts: |x| ≤ hypot(x, y) ≤ hypot(hypot(x, y), z).
+fn with_parts_of_norms(graph: &Graph, parts: Vec<Part>, depth: usize) -> Vec<Part> {
+    let Some(depth) = depth.checked_sub(1) else {
+        return parts;
+    };
+    let mut all = Vec::with_capacity(parts.len());
+    for part in parts {
+        let norm = match part[..] {
+            [(x, 1)] if matches!(graph.node(x), Node::Call { .. }) => {
+                Norm::nested(graph, x, depth).filter(|norm| norm.root == Some(x))
+            }
+            _ => None,
+        };
+        all.push(part);
+        all.extend(norm.into_iter().flat_map(|norm| norm.parts));
+    }
+    all
 }
 
 /// Whether f(x)/x is one at x = 0.
@@ -73,6 +83,10 @@ pub(super) fn is_small_with_its_argument(function: Function) -> bool {
 impl Norm {
     /// The norm of which an expression is a root, a power or the square, or which it is itself.
     pub(super) fn of(graph: &Graph, x: ExprId) -> Option<Self> {
+        Self::nested(graph, x, MAX_NESTING)
+    }
+
+    fn nested(graph: &Graph, x: ExprId, depth: usize) -> Option<Self> {
         let mut x = x;
         for _ in 0..MAX_DEPTH {
             x = graph.as_multiple(x).1;
@@ -88,7 +102,7 @@ impl Norm {
                         return Some(Self {
                             root: Some(x),
                             is_plain: square == argument,
-                            ..Self::of_square(graph, square)?
+                            ..Self::of_square(graph, square, depth)?
                         });
                     }
                     x = square;
@@ -98,42 +112,37 @@ impl Norm {
                     arguments,
                 } => {
                     let parts = arguments.iter().map(|y| part(graph, *y, 1));
+                    let parts = parts.collect::<Option<Vec<Part>>>()?;
                     return Some(Self {
                         root: Some(x),
                         square: None,
                         bare: None,
                         is_plain: true,
                         is_signed: false,
-                        parts: parts.collect::<Option<_>>()?,
+                        parts: with_parts_of_norms(graph, parts, depth),
                     });
                 }
-                Node::Sum { .. } | Node::Product(_) => return Self::of_square(graph, x),
+                Node::Sum { .. } | Node::Product(_) => return Self::of_square(graph, x, depth),
                 _ => return None,
             }
         }
         None
     }
 
-    fn of_square(graph: &Graph, square: ExprId) -> Option<Self> {
+    fn of_square(graph: &Graph, square: ExprId, depth: usize) -> Option<Self> {
         let bare = without_parameters(graph, square);
-        let (constant, terms) = graph.terms(bare.unwrap_or(square));
-        let is_sum_of_squares =
-            constant.is_zero() && terms.iter().all(|(c, _)| !c.is_negative() && !c.is_zero());
-        if !is_sum_of_squares {
-            return None;
-        }
+        let parts = parts_of_form(graph, bare.unwrap_or(square))?;
         let root = Node::Call {
             function: Function::Sqrt,
             arguments: vec![square],
         };
-        let parts = terms.iter().map(|(_, y)| part(graph, *y, 2));
         Some(Self {
             root: graph.find(&root),
             square: Some(square),
             bare,
             is_plain: true,
             is_signed: false,
-            parts: parts.collect::<Option<_>>()?,
+            parts: with_parts_of_norms(graph, parts, depth),
         })
     }
 
