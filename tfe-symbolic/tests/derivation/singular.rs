@@ -454,6 +454,32 @@ fn norms_of_other_quadratic_forms_at_zero() {
     }
 }
 
+/// Functions of powers of distances with a field as exponent: e^(−h²) has the tangent −2 at zero, and e^(−h³) none.
+#[test]
+fn functions_of_powers_of_distances_at_zero() {
+    let of = |energy: &str, c: f64, q: [f64; 2]| {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
+        results_of(&text, &[("c", c)], ALL, &q, &[0.0; 2])
+    };
+    for (energy, c, tangent) in [
+        ("exp(-norm([x, y])^c)", 2.0, -2.0),
+        ("exp(-norm([x, y])^c)", 3.0, 0.0),
+        ("exp(-hypot(x, y)^c)", 2.0, -2.0),
+        ("exp(-(x^2 + y^2)^c)", 1.0, -2.0),
+        ("cos(hypot(x, y)^c)", 2.0, 0.0),
+    ] {
+        let found = of(energy, c, [0.0; 2]);
+        assert_eq!(found.q, [0.0; 2], "{energy}");
+        let expected = [-tangent, 0.0, 0.0, -tangent];
+        assert_eq!(found.qq.concat(), expected, "{energy}");
+    }
+    let found = of("exp(-norm([x, y])^c)", 2.0, [0.3, 0.4]);
+    let e = (-0.25_f64).exp();
+    close(-found.q[0], -0.6 * e, "slope");
+    close(-found.qq[0][0], (0.36 - 2.0) * e, "tangent");
+    close(-found.qq[0][1], 0.48 * e, "tangent");
+}
+
 /// What depends on the direction has no limit.
 #[test]
 fn directions_have_no_limit() {

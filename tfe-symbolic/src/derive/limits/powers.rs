@@ -12,27 +12,17 @@ pub(super) const ROUNDING: f64 = 1e-6;
 impl Norm {
     /// The product with this norm replaced by one where both vanish; `None` where the product is unchanged.
     pub(super) fn limit(&self, graph: &mut Graph, factors: &[(ExprId, i32)]) -> Option<ExprId> {
-        let unknown = |(x, n): &(ExprId, i32)| match graph.node(*x) {
-            Node::Power { base, exponent } if *n == 1 => {
-                let is_number = graph.as_constant(*exponent).is_some();
-                let (coefficient, inner) = graph.as_multiple(*base);
-                let is_own = Some(inner) == self.root || Some(inner) == self.square;
-                let is_known = is_number || coefficient.is_negative();
-                (is_own && !is_known).then_some((*x, *base, *exponent))
-            }
-            _ => None,
-        };
-        let mut unknown = factors.iter().filter_map(unknown);
-        if let Some((power, base, exponent)) = unknown.next() {
-            if unknown.next().is_some() {
+        let base_of = |factor: &(ExprId, i32)| self.base_of_unknown(graph, *factor);
+        let bases: Vec<ExprId> = factors.iter().filter_map(base_of).collect();
+        if let Some(base) = bases.first().copied() {
+            if bases.iter().any(|other| *other != base) {
                 return None;
             }
-            let rest: Vec<(ExprId, i32)> = factors
+            let (powers, rest): (Vec<_>, Vec<_>) = factors
                 .iter()
-                .filter(|(x, _)| *x != power)
                 .copied()
-                .collect();
-            return self.limit_of_power(graph, (base, exponent), &rest);
+                .partition(|factor| self.base_of_unknown(graph, *factor).is_some());
+            return self.limit_of_powers(graph, (base, &powers), &rest);
         }
         let mut all = factors.iter();
         let diverges = all.any(|factor| self.diverges(graph, *factor, MAX_SUMS));
@@ -47,13 +37,25 @@ impl Norm {
         Some(graph.product(Constant::ONE, &limit))
     }
 
+    /// The base of a power of the norm, or of its square, with an exponent that is not known.
+    fn base_of_unknown(&self, graph: &Graph, (x, n): (ExprId, i32)) -> Option<ExprId> {
+        let Node::Power { base, exponent } = *graph.node(x) else {
+            return None;
+        };
+        let (coefficient, inner) = graph.as_multiple(base);
+        let is_own = Some(inner) == self.root || Some(inner) == self.square;
+        let is_number = graph.as_constant(exponent).is_some();
+        (n > 0 && is_own && !is_number && !coefficient.is_negative()).then_some(base)
+    }
+
     /// t hᵉ with an exponent that is not known: (t/hᵐ) hᵉ⁺ᵐ with t/hᵐ of degree zero. That is zero, or infinite, with the power alone.
+    /// Of several powers e is the sum of the exponents; with m = 0 they stay as they are.
     ///
     /// Of t (h²)ᵉ with t of odd degree, where no root of h² is at hand, one degree is left beside the power.
-    fn limit_of_power(
+    fn limit_of_powers(
         &self,
         graph: &mut Graph,
-        (base, exponent): (ExprId, ExprId),
+        (base, powers): (ExprId, &[(ExprId, i32)]),
         factors: &[(ExprId, i32)],
     ) -> Option<ExprId> {
         let inner = graph.as_multiple(base).1;
@@ -96,26 +98,45 @@ impl Norm {
         };
         let units = if is_root { 1 } else { 2 };
         let added = Constant::rational(i128::from(shift + above - left), units)?;
-        let (number, terms) = graph.terms(exponent);
-        let number = number + added;
-        let mut raised = base;
-        if left == 1 {
-            // A potential (h²)⁻ᵉ has no limit.
-            let may_be_large = terms.iter().any(|(c, _)| !c.is_negative());
-            if !may_be_large || (is_single && !number.is_negative()) {
-                return None;
-            }
+        let is_one_power = matches!(powers, [(_, 1)]);
+        if added.is_zero() && left == 0 && !is_one_power {
+            rest.extend(powers);
+        } else {
+            let powers = (base, powers);
+            rest.push((self.raised(graph, powers, added, (left, is_single))?, 1));
         }
-        let exponent = graph.linear(number, &terms);
-        if left == 1 && number.is_negative() {
-            raised = self.one_where_root_vanishes(graph, base, exponent);
-        }
-        rest.push((graph.power(raised, exponent), 1));
         if times > 0 {
             let divisor = self.one_where_zero(graph, divisor);
             rest.push((divisor, -i32::try_from(times).ok()?));
         }
         Some(graph.product(Constant::ONE, &rest))
+    }
+
+    /// The product of powers of one base with a number added to the sum of the exponents. `left` is the degree of what is beside it.
+    fn raised(
+        &self,
+        graph: &mut Graph,
+        (base, powers): (ExprId, &[(ExprId, i32)]),
+        added: Constant,
+        (left, is_single): (i64, bool),
+    ) -> Option<ExprId> {
+        let (number, terms) = sum_of_exponents(graph, powers);
+        let number = number + added;
+        if left == 0 {
+            let exponent = graph.linear(number, &terms);
+            return Some(graph.power(base, exponent));
+        }
+        // A potential (h²)⁻ᵉ has no limit.
+        let may_be_large = terms.iter().any(|(c, _)| !c.is_negative());
+        if !may_be_large || (is_single && !number.is_negative()) {
+            return None;
+        }
+        let exponent = graph.linear(number, &terms);
+        let raised = match number.is_negative() {
+            true => self.one_where_root_vanishes(graph, base, exponent),
+            false => base,
+        };
+        Some(graph.power(raised, exponent))
     }
 
     /// A square below one of the xᵢ, as x (h²)ᵉ, with one where it is zero, if the product with that is zero with it: where the exponent is −½ or more.
@@ -131,4 +152,22 @@ impl Norm {
         let at_zero = graph.select(Comparison::LessOrEqual, least, exponent, one, zero);
         self.elsewhere(graph, square, at_zero)
     }
+}
+
+/// The number and the other terms of the exponent of a product of powers.
+fn sum_of_exponents(
+    graph: &Graph,
+    powers: &[(ExprId, i32)],
+) -> (Constant, Vec<(Constant, ExprId)>) {
+    let (mut number, mut terms) = (Constant::ZERO, Vec::new());
+    for (power, n) in powers {
+        let Node::Power { exponent, .. } = graph.node(*power) else {
+            continue;
+        };
+        let times = Constant::integer(i64::from(*n));
+        let (own, others) = graph.terms(*exponent);
+        number = number + times * own;
+        terms.extend(others.into_iter().map(|(c, x)| (times * c, x)));
+    }
+    (number, terms)
 }
