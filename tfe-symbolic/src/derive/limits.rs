@@ -31,7 +31,7 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::rewrite::Mapping;
 use crate::program::Array;
 use exponentials::{over_exponentials, where_exponentials_vanish};
-use exponents::where_exponents_vanish;
+use exponents::{where_exponents_vanish, with_quotients_merged};
 use facts::{factors_of, is_surely_positive, is_zero};
 use norms::Norms;
 use sides::take_limits_from_both_sides;
@@ -71,7 +71,8 @@ pub(crate) fn take_limits<'a>(
         if !is_product(graph, old) {
             return together.limit(graph, &mut norms, (old, new));
         }
-        let product = norms.limit(graph, new);
+        let product = with_quotients_merged(graph, new);
+        let product = norms.limit(graph, product);
         let product = over_exponentials(graph, product);
         let product = inside_choices(graph, product);
         let product = where_exponents_vanish(graph, product);

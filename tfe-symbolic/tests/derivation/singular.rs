@@ -124,6 +124,40 @@ fn logarithms_of_distances_at_zero() {
     }
 }
 
+/// xᶜ ln x and its slope xᶜ⁻¹ (c ln x + 1) are zero at zero where the power is.
+#[test]
+fn logarithms_beside_fields_as_exponents() {
+    for (energy, c, x) in [
+        ("x^c*ln(x)", 3.0, 0.0),
+        ("x^c*ln(x/3)", 3.0, 0.0),
+        ("x^c*(ln(x) - 1)", 3.0, 0.0),
+        ("(x - 1)^c*ln(x - 1)", 3.0, 1.0),
+        ("abs(x)^c*ln(abs(x))", 3.0, 0.0),
+        ("max(x, 0)^c*ln(max(x, 0))", 3.0, 0.0),
+        ("max(x, 0)^c*ln(max(x, 0))", 3.0, -1.0),
+    ] {
+        check(energy, &[("c", c)], x, &[0.0, 0.0, 0.0]);
+    }
+    let l = 4_f64.ln();
+    let (value, slope) = (32.0 * l, 8.0 * (2.5 * l + 1.0));
+    let second = 2.0 * (3.75 * l + 4.0);
+    let parameters = [("c", 2.5)];
+    check("x^c*ln(x)", &parameters, 4.0, &[value, slope, second]);
+    let expected = [value, -slope, second];
+    check("abs(x)^c*ln(abs(x))", &parameters, -4.0, &expected);
+    // The second derivative 2 ln x + 3 with c = 2, and the first with c = 1, are infinite.
+    let text = "coordinates(x), lagrangian = dot(x)^2/2 - x^c*ln(x)";
+    let of = |c: f64, x: f64| results_of(text, &[("c", c)], ALL, &[x], &[0.0]);
+    let found = of(2.0, 0.0);
+    assert_eq!((found.value, found.q[0]), (0.0, 0.0));
+    assert_eq!(found.qq[0][0], f64::INFINITY);
+    let found = of(1.0, 0.0);
+    assert_eq!((found.value, found.q[0]), (0.0, f64::INFINITY));
+    // What has no value keeps none.
+    let found = of(3.0, -1.0);
+    assert!(found.value.is_nan() && found.q[0].is_nan() && found.qq[0][0].is_nan());
+}
+
 /// Powers with a field as exponent: derivatives with the factors e, e − 1, … are zero at zero where these are.
 #[test]
 fn fields_as_exponents_at_zero() {

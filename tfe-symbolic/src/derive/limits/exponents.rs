@@ -5,10 +5,50 @@
 //! exponent all whole factors count as such numbers, of another one those that are its multiples, but for a number.
 
 use super::facts::{factors_of, is_at_rest, is_zero, moves};
+use super::norm::Norm;
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
+use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::Input;
+
+/// xᵉ/xⁿ → xᵉ⁻ⁿ for an exponent of fields, and |x|ᵉ/x²ⁿ likewise: 0/0 at zero as it stands. Powers of norms are treated with these.
+pub(super) fn with_quotients_merged(graph: &mut Graph, x: ExprId) -> ExprId {
+    let factors = factors_of(graph, x);
+    for (power, n) in &factors {
+        let Node::Power { base, exponent } = *graph.node(*power) else {
+            continue;
+        };
+        let mut divisors = factors
+            .iter()
+            .filter(|(y, m)| divides(graph, base, (*y, *m)));
+        let Some((divisor, m)) = divisors.next().copied() else {
+            continue;
+        };
+        let is_number = graph.as_constant(exponent).is_some();
+        let is_of_fields = !is_number && graph.inputs_of(exponent).iter().all(is_at_rest);
+        if *n != 1 || !is_of_fields || !may_vanish(graph, base) {
+            continue;
+        }
+        let (number, terms) = graph.terms(exponent);
+        let exponent = graph.linear(number + Constant::integer(i64::from(m)), &terms);
+        let quotient = graph.power(base, exponent);
+        let changes = [(*power, -1), (divisor, -m), (quotient, 1)];
+        let coefficient = graph.as_multiple(x).0;
+        return graph.product(coefficient, &[&factors[..], &changes].concat());
+    }
+    x
+}
+
+/// Whether a factor is a base below, or that of which the base is the absolute value, with an even exponent.
+fn divides(graph: &Graph, base: ExprId, (y, n): (ExprId, i32)) -> bool {
+    let is_size = matches!(
+        graph.node(base),
+        Node::Call { function: Function::Abs, arguments } if arguments[..] == [y]
+    );
+    let is_base = y == base && Norm::of(graph, base).is_none();
+    n < 0 && (is_base || (is_size && n % 2 == 0))
+}
 
 /// A product with zero in place of powers where numbers n, n − 1, … beside them vanish: with a negative exponent they are infinite at
 /// zero.

@@ -1,28 +1,33 @@
 //! Limits of products in one norm: of those that vanish with it, and of those with powers of it whose exponent is not
 //! known.
 
+use super::facts::{argument_of_logarithm, factors_of};
 use super::norm::{MAX_DEPTH, MAX_SUMS, Norm};
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
+use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 
 /// Degrees are sums of exponents, which may have rounding errors.
 pub(super) const ROUNDING: f64 = 1e-6;
 
+/// A factor and its exponent.
+type Factor = (ExprId, i32);
+
 impl Norm {
     /// The product with this norm replaced by one where both vanish; `None` where the product is unchanged.
-    pub(super) fn limit(&self, graph: &mut Graph, factors: &[(ExprId, i32)]) -> Option<ExprId> {
-        let base_of = |factor: &(ExprId, i32)| self.base_of_unknown(graph, *factor);
+    pub(super) fn limit(&self, graph: &mut Graph, factors: &[Factor]) -> Option<ExprId> {
+        let base_of = |factor: &Factor| self.base_of_unknown(graph, *factor);
         let bases: Vec<ExprId> = factors.iter().filter_map(base_of).collect();
         if let Some(base) = bases.first().copied() {
             if bases.iter().any(|other| *other != base) {
                 return None;
             }
-            let (powers, rest): (Vec<_>, Vec<_>) = factors
+            let (powers, rest): (Vec<Factor>, Vec<Factor>) = factors
                 .iter()
                 .copied()
                 .partition(|factor| self.base_of_unknown(graph, *factor).is_some());
-            return self.limit_of_powers(graph, (base, &powers), &rest);
+            return self.limit_with_powers(graph, (base, &powers), &rest);
         }
         let mut all = factors.iter();
         let diverges = all.any(|factor| self.diverges(graph, *factor, MAX_SUMS));
@@ -38,7 +43,7 @@ impl Norm {
     }
 
     /// The base of a power of the norm, or of its square, with an exponent that is not known.
-    fn base_of_unknown(&self, graph: &Graph, (x, n): (ExprId, i32)) -> Option<ExprId> {
+    fn base_of_unknown(&self, graph: &Graph, (x, n): Factor) -> Option<ExprId> {
         let Node::Power { base, exponent } = *graph.node(x) else {
             return None;
         };
@@ -48,16 +53,64 @@ impl Norm {
         (n > 0 && is_own && !is_number && !coefficient.is_negative()).then_some(base)
     }
 
-    /// t hᵉ with an exponent that is not known: (t/hᵐ) hᵉ⁺ᵐ with t/hᵐ of degree zero. That is zero, or infinite, with the power alone.
-    /// Of several powers e is the sum of the exponents; with m = 0 they stay as they are.
+    /// A product with powers of this norm. Beside a power that is zero, logarithms of the norm count as zero: hᵉ ln h is smaller than hᵉ⁻ᵟ.
+    fn limit_with_powers(
+        &self,
+        graph: &mut Graph,
+        (base, powers): (ExprId, &[Factor]),
+        factors: &[Factor],
+    ) -> Option<ExprId> {
+        let (logarithms, rest): (Vec<Factor>, Vec<Factor>) = factors
+            .iter()
+            .copied()
+            .partition(|factor| self.grows_as_logarithm(graph, *factor));
+        let limit = self.limit_of_powers(graph, (base, powers), &rest);
+        if logarithms.is_empty() {
+            let (powers, rest) = limit?;
+            return Some(graph.product(Constant::ONE, &[powers, rest].concat()));
+        }
+        let is_own = |(x, _): &Factor| self.own_degree(graph, *x, MAX_DEPTH).is_some();
+        if limit.is_none() && rest.iter().any(is_own) {
+            return None;
+        }
+        let (powers, rest) = limit.unwrap_or_else(|| (powers.to_vec(), rest));
+        let mut size = graph.product(Constant::ONE, &powers);
+        if !self.has_parts() {
+            // Of a negative number the logarithm is not a number, whatever the power is.
+            size = graph.call(Function::Abs, &[size]);
+        }
+        let zero = graph.constant(Constant::ZERO);
+        let mut all = [powers, rest].concat();
+        for (x, n) in logarithms {
+            let finite = graph.select(Comparison::LessOrEqual, size, zero, zero, x);
+            all.push((finite, n));
+        }
+        Some(graph.product(Constant::ONE, &all))
+    }
+
+    /// Whether a factor is infinite with the norm by its logarithm alone: ln h, or a sum such as ln h − 1.
+    fn grows_as_logarithm(&self, graph: &Graph, (x, n): Factor) -> bool {
+        if n < 0 || !self.diverges(graph, (x, n), MAX_SUMS) {
+            return false;
+        }
+        let is_logarithm = |x: ExprId| argument_of_logarithm(graph, x).is_some();
+        let Some((_, terms)) = graph.as_sum(x) else {
+            return is_logarithm(x);
+        };
+        let mut factors = terms.iter().flat_map(|(_, term)| factors_of(graph, *term));
+        factors.all(|factor| is_logarithm(factor.0) || !self.diverges(graph, factor, MAX_SUMS))
+    }
+
+    /// t hᵉ with an exponent that is not known: (t/hᵐ) hᵉ⁺ᵐ with t/hᵐ of degree zero, as the power and the other factors. That is zero, or
+    /// infinite, with the power alone. Of several powers e is the sum of the exponents; with m = 0 they stay as they are.
     ///
     /// Of t (h²)ᵉ with t of odd degree, where no root of h² is at hand, one degree is left beside the power.
     fn limit_of_powers(
         &self,
         graph: &mut Graph,
-        (base, powers): (ExprId, &[(ExprId, i32)]),
-        factors: &[(ExprId, i32)],
-    ) -> Option<ExprId> {
+        (base, powers): (ExprId, &[Factor]),
+        factors: &[Factor],
+    ) -> Option<(Vec<Factor>, Vec<Factor>)> {
         let inner = graph.as_multiple(base).1;
         let is_root = Some(inner) == self.root;
         let (mut rest, mut shift) = (Vec::new(), 0);
@@ -99,24 +152,25 @@ impl Norm {
         let units = if is_root { 1 } else { 2 };
         let added = Constant::rational(i128::from(shift + above - left), units)?;
         let is_one_power = matches!(powers, [(_, 1)]);
-        if added.is_zero() && left == 0 && !is_one_power {
-            rest.extend(powers);
-        } else {
-            let powers = (base, powers);
-            rest.push((self.raised(graph, powers, added, (left, is_single))?, 1));
-        }
+        let powers = match added.is_zero() && left == 0 && !is_one_power {
+            true => powers.to_vec(),
+            false => {
+                let raised = self.raised(graph, (base, powers), added, (left, is_single))?;
+                vec![(raised, 1)]
+            }
+        };
         if times > 0 {
             let divisor = self.one_where_zero(graph, divisor);
             rest.push((divisor, -i32::try_from(times).ok()?));
         }
-        Some(graph.product(Constant::ONE, &rest))
+        Some((powers, rest))
     }
 
     /// The product of powers of one base with a number added to the sum of the exponents. `left` is the degree of what is beside it.
     fn raised(
         &self,
         graph: &mut Graph,
-        (base, powers): (ExprId, &[(ExprId, i32)]),
+        (base, powers): (ExprId, &[Factor]),
         added: Constant,
         (left, is_single): (i64, bool),
     ) -> Option<ExprId> {
@@ -155,10 +209,7 @@ impl Norm {
 }
 
 /// The number and the other terms of the exponent of a product of powers.
-fn sum_of_exponents(
-    graph: &Graph,
-    powers: &[(ExprId, i32)],
-) -> (Constant, Vec<(Constant, ExprId)>) {
+fn sum_of_exponents(graph: &Graph, powers: &[Factor]) -> (Constant, Vec<(Constant, ExprId)>) {
     let (mut number, mut terms) = (Constant::ZERO, Vec::new());
     for (power, n) in powers {
         let Node::Power { exponent, .. } = graph.node(*power) else {
