@@ -14,6 +14,7 @@ pub mod input;
 pub mod ordered;
 pub(crate) mod polynomial;
 pub(crate) mod rewrite;
+mod roots;
 pub(crate) mod simplify;
 pub mod sorting;
 mod sums;

@@ -222,7 +222,7 @@ impl Graph {
     }
 
     /// Whether it can be zero; parameters cannot, because they count as positive.
-    fn may_vanish(&self, x: ExprId) -> bool {
+    pub(super) fn may_vanish(&self, x: ExprId) -> bool {
         !matches!(
             self.node(x),
             Node::Input(Input::Parameter(_) | Input::ParameterElement(..))

@@ -11,7 +11,7 @@
 //! | numbers | whose product or power leaves the normal numbers of `f64` stay beside their factors: (1e-200 x)² is not 0·x² |
 //! | quotients | x/y → x·y⁻¹; x/x → 1; xᵉ/xⁿ → xᵉ⁻ⁿ for a number e; xᵉ⁻¹·x → xᵉ |
 //! | powers | x^n a product for whole n; x^(n/2) → √xⁿ |
-//! | √ | √x^(2n) → xⁿ; √(x²) → abs x |
+//! | √ | √x^(2n) → xⁿ; √(x²) → abs x; √(x⁴ + x⁶) → x² √(1 + x²); √(1 − cos x) → √(2 sin²(x/2)), and so for 1 + cos x and cosh x − 1 |
 //! | abs, sign | abs(x)^(2n) → x^(2n); abs(x^(2n)) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
 //! | sinh, cosh | sinh x/cosh x → tanh x |
 //! | parity | sin(−x) → −sin x, cos(−x) → cos x, and so for each even or odd function |
@@ -146,8 +146,8 @@ impl Graph {
         }
         match (function, self.node(x)) {
             (Function::Sqrt, Node::Product(_) | Node::Sum { .. }) => {
-                if let Some(half) = self.root_of_square(x) {
-                    return self.call(Function::Abs, &[half]);
+                if let Some(root) = self.simpler_root(x) {
+                    return root;
                 }
             }
             (
@@ -166,19 +166,6 @@ impl Graph {
             function,
             arguments: vec![x],
         })
-    }
-
-    /// y of x = y², where that is a number times even powers.
-    fn root_of_square(&mut self, x: ExprId) -> Option<ExprId> {
-        let (coefficient, inner) = self.as_multiple(x);
-        let Node::Product(factors) = self.node(inner) else {
-            return None;
-        };
-        if factors.iter().any(|(_, n)| n % 2 != 0) {
-            return None;
-        }
-        let halves: Vec<(ExprId, i32)> = factors.iter().map(|(x, n)| (*x, n / 2)).collect();
-        Some(self.product(coefficient.exact_sqrt()?, &halves))
     }
 
     /// `then` where `left comparison right` holds, `otherwise` elsewhere.

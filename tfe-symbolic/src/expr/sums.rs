@@ -325,7 +325,7 @@ fn terms_below(graph: &Graph, divisor: ExprId) -> Vec<TermBelow> {
 }
 
 /// The factors of an expression with their exponents.
-fn factors_of(graph: &Graph, x: ExprId) -> Vec<(ExprId, i32)> {
+pub(super) fn factors_of(graph: &Graph, x: ExprId) -> Vec<(ExprId, i32)> {
     match graph.node(x) {
         Node::Product(factors) => factors.clone(),
         _ => vec![(x, 1)],
@@ -402,7 +402,7 @@ fn without(
 }
 
 /// The quotient of a product and a product of some of its factors.
-fn quotient(factors: &[(ExprId, i32)], by: &[(ExprId, i32)]) -> Option<Vec<(ExprId, i32)>> {
+pub(super) fn quotient(factors: &[(ExprId, i32)], by: &[(ExprId, i32)]) -> Option<Vec<(ExprId, i32)>> {
     let mut rest = factors.to_vec();
     let stands = |m: i32, n: i32| if n > 0 { m >= n } else { m <= n };
     for (x, n) in by {

@@ -345,6 +345,40 @@ fn kinks_of_several_coordinates_that_make_a_smooth_product() {
     }
 }
 
+/// Roots of x⁴ + x⁶ = x⁴ (1 + x²), of 1 − cos x = 2 sin²(x/2) and of cosh x − 1 = 2 sinh²(x/2).
+#[test]
+fn roots_of_even_powers_at_zero() {
+    check("sqrt(x^4 + x^6)", &[], 0.0, &[0.0, 0.0, 2.0]);
+    let r = 5_f64.sqrt();
+    let second = 2.0 * r + 20.0 / r - 16.0 / (5.0 * r);
+    let expected = [4.0 * r, 4.0 * r + 8.0 / r, second];
+    check("sqrt(x^4 + x^6)", &[], 2.0, &expected);
+    for energy in [
+        "sqrt(1 - cos(x))^3",
+        "(1 - cos(x))^1.5",
+        "sqrt(k*(1 - cos(x)))^3",
+        "(cosh(x) - 1)^1.5",
+    ] {
+        let parameters: &[_] = match energy.contains('k') {
+            true => &[("k", 1.0)],
+            false => &[],
+        };
+        check(energy, parameters, 0.0, &[0.0, 0.0, 0.0]);
+        let ((s, c), sign) = match energy.contains("cosh") {
+            true => ((0.25_f64.sinh(), 0.25_f64.cosh()), 1.0),
+            false => (0.25_f64.sin_cos(), -1.0),
+        };
+        let eight = 8_f64.sqrt();
+        let first = 1.5 * eight * s * s * c;
+        let second = 1.5 * eight * (s * c * c + sign * s.powi(3) / 2.0);
+        let value = eight * s.powi(3);
+        check(energy, parameters, 0.5, &[value, first, second]);
+        check(energy, parameters, -0.5, &[value, -first, second]);
+    }
+    // 1 − cos x is rounded to zero here.
+    check("sqrt(1 - cos(x))", &[], 1e-9, &[1e-9 * 0.5_f64.sqrt()]);
+}
+
 /// Logistic functions and hyperbolic secants far from their step, where the exponentials in them are infinite.
 #[test]
 fn steps_of_exponentials_far_away() {
