@@ -30,7 +30,7 @@ use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::rewrite::Mapping;
 use crate::program::Array;
-use exponentials::{over_exponentials, where_exponentials_vanish};
+use exponentials::{logarithm_where_infinite, over_exponentials, where_exponentials_vanish};
 use exponents::{where_exponents_vanish, with_quotients_merged};
 use facts::{factors_of, is_surely_positive, is_zero};
 use norms::Norms;
@@ -69,6 +69,7 @@ pub(crate) fn take_limits<'a>(
     slopes.append(&mut forces);
     rewrite(graph, &mut slopes, &mut |graph, old, new| {
         if !is_product(graph, old) {
+            let new = logarithm_where_infinite(graph, new);
             return together.limit(graph, &mut norms, (old, new));
         }
         let product = with_quotients_merged(graph, new);
@@ -80,7 +81,7 @@ pub(crate) fn take_limits<'a>(
     });
     rewrite(graph, &mut values, &mut |graph, old, new| {
         if !is_product(graph, old) {
-            return new;
+            return logarithm_where_infinite(graph, new);
         }
         let product = norms.limit(graph, new);
         over_exponentials(graph, product)
@@ -91,7 +92,7 @@ fn is_product(graph: &Graph, x: ExprId) -> bool {
     matches!(graph.node(x), Node::Product(_))
 }
 
-/// Rewrites the products and sums in entries, children first: `limit` is given each of them, and what has become of it by
+/// Rewrites the products, sums and logarithms in entries, children first: `limit` is given each of them, and what has become of it by
 /// the limits of its children.
 fn rewrite(
     graph: &mut Graph,
@@ -102,7 +103,15 @@ fn rewrite(
     let mut mapping = Mapping::default();
     for old in graph.reachable(&roots) {
         let node = graph.node(old);
-        let may_have_one = matches!(node, Node::Product(_) | Node::Sum { .. });
+        let may_have_one = matches!(
+            node,
+            Node::Product(_)
+                | Node::Sum { .. }
+                | Node::Call {
+                    function: Function::Ln,
+                    ..
+                }
+        );
         let keeps = mapping.keeps(node);
         if keeps && !may_have_one {
             continue;

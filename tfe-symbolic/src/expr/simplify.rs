@@ -13,7 +13,7 @@
 //! | powers | x^n a product for whole n; x^(n/2) → √xⁿ |
 //! | √ | √x^(2n) → xⁿ; √(x²) → abs x; √(x⁴ + x⁶) → x² √(1 + x²); √(1 − cos x) → √(2 sin²(x/2)), and so for 1 + cos x and cosh x − 1 |
 //! | abs, sign | abs(x)^(2n) → x^(2n); abs(x^(2n)) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
-//! | sinh, cosh | sinh x/cosh x → tanh x |
+//! | sinh, cosh | sinh x/cosh x → tanh x; a eˣ + a e⁻ˣ → 2 a cosh x; a eˣ − a e⁻ˣ → 2 a sinh x |
 //! | parity | sin(−x) → −sin x, cos(−x) → cos x, and so for each even or odd function |
 //! | min, max | of x and x → x; hypot(x, 0) → abs x |
 //! | select | with equal branches → the branch; with a decided condition → its branch |

@@ -17,6 +17,7 @@ impl Graph {
         }
         sum.open_where_terms_cancel(self);
         sum.join_squares_of_sine_and_cosine(self);
+        sum.join_exponentials(self);
         sum.join_parts_of_denominators(self);
         let Collected { constant, terms } = sum;
         let mut terms: Vec<(Constant, ExprId)> = terms
@@ -165,6 +166,29 @@ impl Collected {
         }
     }
 
+    /// a eᵘ + a e⁻ᵘ → 2 a cosh u and a eᵘ − a e⁻ᵘ → 2 a sinh u: quotients of these are finite where the exponentials are not.
+    fn join_exponentials(&mut self, graph: &mut Graph) {
+        while self.terms.len() > 1 {
+            let joined = self.terms.iter().find_map(|(x, coefficient)| {
+                let (exponent, inverse) = exponent_and_inverse(graph, *x)?;
+                let other = *self.terms.get(&inverse)?;
+                let has_same_size = other.abs() == coefficient.abs();
+                has_same_size.then_some((*x, inverse, exponent, *coefficient, other))
+            });
+            let Some((x, inverse, exponent, coefficient, other)) = joined else {
+                return;
+            };
+            self.terms.remove(&x);
+            self.terms.remove(&inverse);
+            let function = match other == coefficient {
+                true => Function::Cosh,
+                false => Function::Sinh,
+            };
+            let value = graph.call(function, &[exponent]);
+            self.push(graph, Constant::integer(2) * coefficient, value);
+        }
+    }
+
     /// a r uⁿ⁺¹ − a c r uⁿ w → a r uⁿ (u − c w), where c w is a term of u, a sum with positive coefficients, and n < 0.
     ///
     /// With u = x² + y² this is 1/√u − x²/√u³ → y²/√u³, the second derivative of a distance: nothing cancels any more where y is small. With
@@ -195,6 +219,31 @@ impl Collected {
             self.push(graph, coefficient, product);
         }
     }
+}
+
+/// u and e⁻ᵘ of eᵘ, if both powers have been made.
+fn exponent_and_inverse(graph: &Graph, x: ExprId) -> Option<(ExprId, ExprId)> {
+    let Node::Call {
+        function: Function::Exp,
+        arguments,
+    } = graph.node(x)
+    else {
+        return None;
+    };
+    let exponent = *arguments.first()?;
+    let (c, inner) = graph.as_multiple(exponent);
+    let opposite = match (-c).is_one() {
+        true => inner,
+        false => graph.find(&Node::Sum {
+            constant: Constant::ZERO,
+            terms: vec![(-c, inner)],
+        })?,
+    };
+    let inverse = Node::Call {
+        function: Function::Exp,
+        arguments: vec![opposite],
+    };
+    Some((exponent, graph.find(&inverse)?))
 }
 
 /// A product r uⁿ w, where c w is a term of u.
@@ -402,7 +451,10 @@ fn without(
 }
 
 /// The quotient of a product and a product of some of its factors.
-pub(super) fn quotient(factors: &[(ExprId, i32)], by: &[(ExprId, i32)]) -> Option<Vec<(ExprId, i32)>> {
+pub(super) fn quotient(
+    factors: &[(ExprId, i32)],
+    by: &[(ExprId, i32)],
+) -> Option<Vec<(ExprId, i32)>> {
     let mut rest = factors.to_vec();
     let stands = |m: i32, n: i32| if n > 0 { m >= n } else { m <= n };
     for (x, n) in by {

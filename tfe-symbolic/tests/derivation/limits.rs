@@ -326,6 +326,33 @@ fn powers_of_hypot_of_sums_at_zero() {
     }
 }
 
+/// Cubes of the root of q = a (x² + y²) + b x y: slopes 3 √q q′/2 and curvatures 3 √q q″/2 + 3 q′ q′/(4 √q).
+#[test]
+fn norms_of_other_quadratic_forms_at_zero() {
+    for (energy, a, b) in [
+        ("sqrt(x^2 + x*y + y^2)^3", 1.0, 1.0),
+        ("sqrt(x^2 - x*y + y^2)^3", 1.0, -1.0),
+        ("(2*x^2 + 3*x*y + 2*y^2)^1.5", 2.0, 3.0),
+        ("hypot(hypot(x, y), x - y)^3", 2.0, -2.0),
+        ("norm([norm([x, y]), x - y])^3", 2.0, -2.0),
+    ] {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
+        let found = results_of(&text, &[], ALL, &[0.0; 2], &[0.0; 2]);
+        assert_eq!(found.q, [0.0; 2], "{energy}");
+        assert_eq!(found.qq.concat(), [0.0; 4], "{energy}");
+        let found = results_of(&text, &[], ALL, &[1.0, 3.0], &[0.0; 2]);
+        let root = f64::sqrt(10.0 * a + 3.0 * b);
+        let slopes = [2.0 * a + 3.0 * b, 6.0 * a + b];
+        close(-found.q[0], 1.5 * root * slopes[0], energy);
+        close(-found.q[1], 1.5 * root * slopes[1], energy);
+        let curvature = |second: f64, i: usize, j: usize| {
+            1.5 * root * second + 0.75 * slopes[i] * slopes[j] / root
+        };
+        close(-found.qq[0][0], curvature(2.0 * a, 0, 0), energy);
+        close(-found.qq[0][1], curvature(b, 0, 1), energy);
+    }
+}
+
 /// Powers of squares with an exponent that is a field: the force −2 k c (k u)ᶜ⁻¹ x vanishes with u = x² + y² where c is one half or more.
 #[test]
 fn powers_of_squares_at_zero() {

@@ -388,6 +388,12 @@ fn steps_of_exponentials_far_away() {
         ("2/(1 + exp(-2*x/e)) - 1", [-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
         ("x/(1 + exp(-x/e))", [0.0, 0.0, 0.0], [1.0, 1.0, 0.0]),
         ("1/cosh(x/e)^2", [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+        ("1/(exp(x/e) + exp(-x/e))", [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]),
+        (
+            "(exp(x/e) - exp(-x/e))/(exp(x/e) + exp(-x/e))",
+            [-1.0, 0.0, 0.0],
+            [1.0, 0.0, 0.0],
+        ),
     ] {
         check(energy, &[("e", 1e-4)], -1.0, &before);
         check(energy, &[("e", 1e-4)], 1.0, &after);
@@ -409,6 +415,38 @@ fn steps_of_exponentials_far_away() {
     let (t, square) = (0.3_f64.tanh(), 0.3_f64.cosh().powi(-2));
     let expected = [square, -2.0 * t * square, (6.0 * t * t - 2.0) * square];
     check("1/cosh(x/e)^2", &[("e", 1.0)], 0.3, &expected);
+    let value = 0.5 * square.sqrt();
+    let expected = [value, -t * value, (2.0 * t * t - 1.0) * value];
+    check("1/(exp(x) + exp(-x))", &[], 0.3, &expected);
+    // The difference of the exponentials has no digits here.
+    let expected = [1e-17 / 3.0, 1.0 / 3.0];
+    check("(exp(x/3) - exp(-x/3))/2", &[], 1e-17, &expected);
+}
+
+/// ln cosh u = |u| − ln 2 and ln(r + d eᵘ) = u + ln d where the arguments are infinite.
+#[test]
+fn logarithms_of_exponentials_far_away() {
+    let (two, three) = (2_f64.ln(), 3_f64.ln());
+    let parameters = [("e", 1e-4), ("d", 3.0)];
+    for (energy, x, expected) in [
+        ("e*ln(cosh(x/e))", 1.0, [1.0 - 1e-4 * two, 1.0, 0.0]),
+        ("e*ln(cosh(x/e))", -1.0, [1.0 - 1e-4 * two, -1.0, 0.0]),
+        ("e*ln(exp(x/e) + exp(-x/e))", -1.0, [1.0, -1.0, 0.0]),
+        ("e*ln(1 + exp(x/e))", 1.0, [1.0, 1.0, 0.0]),
+        ("e*ln(1 + exp(x/e))", -1.0, [0.0, 0.0, 0.0]),
+        ("e*ln(2 + 3*exp(x/e))", 1.0, [1.0 + 1e-4 * three, 1.0, 0.0]),
+        ("e*ln(2 + d*exp(x/e))", 1.0, [1.0 + 1e-4 * three, 1.0, 0.0]),
+        ("x*ln(cosh(x/e))", 1.0, [1e4 - two, 2e4 - two, 2e4]),
+    ] {
+        let parameters = &parameters[..1 + usize::from(energy.contains("d*"))];
+        check(energy, parameters, x, &expected);
+    }
+    let (t, value) = (0.3_f64.tanh(), 0.3_f64.cosh().ln());
+    check("ln(cosh(x))", &[], 0.3, &[value, t, 1.0 - t * t]);
+    // What has no value keeps none.
+    let text = "coordinates(x), lagrangian = dot(x)^2/2 - ln(1 - exp(x))";
+    let found = results_of(text, &[], ALL, &[800.0], &[0.0]);
+    assert!(found.value.is_nan());
 }
 
 /// An exponential vanishes faster than the poles in its exponent grow.
@@ -492,33 +530,6 @@ fn even_functions_of_distances_at_zero() {
         assert_eq!(found.q, [0.0; 2], "{energy}");
         let expected = [-tangent, 0.0, 0.0, -tangent];
         assert_eq!(found.qq.concat(), expected, "{energy}");
-    }
-}
-
-/// Cubes of the root of q = a (x² + y²) + b x y: slopes 3 √q q′/2 and curvatures 3 √q q″/2 + 3 q′ q′/(4 √q).
-#[test]
-fn norms_of_other_quadratic_forms_at_zero() {
-    for (energy, a, b) in [
-        ("sqrt(x^2 + x*y + y^2)^3", 1.0, 1.0),
-        ("sqrt(x^2 - x*y + y^2)^3", 1.0, -1.0),
-        ("(2*x^2 + 3*x*y + 2*y^2)^1.5", 2.0, 3.0),
-        ("hypot(hypot(x, y), x - y)^3", 2.0, -2.0),
-        ("norm([norm([x, y]), x - y])^3", 2.0, -2.0),
-    ] {
-        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
-        let found = results_of(&text, &[], ALL, &[0.0; 2], &[0.0; 2]);
-        assert_eq!(found.q, [0.0; 2], "{energy}");
-        assert_eq!(found.qq.concat(), [0.0; 4], "{energy}");
-        let found = results_of(&text, &[], ALL, &[1.0, 3.0], &[0.0; 2]);
-        let root = f64::sqrt(10.0 * a + 3.0 * b);
-        let slopes = [2.0 * a + 3.0 * b, 6.0 * a + b];
-        close(-found.q[0], 1.5 * root * slopes[0], energy);
-        close(-found.q[1], 1.5 * root * slopes[1], energy);
-        let curvature = |second: f64, i: usize, j: usize| {
-            1.5 * root * second + 0.75 * slopes[i] * slopes[j] / root
-        };
-        close(-found.qq[0][0], curvature(2.0 * a, 0, 0), energy);
-        close(-found.qq[0][1], curvature(b, 0, 1), energy);
     }
 }
 

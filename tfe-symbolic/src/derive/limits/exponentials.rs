@@ -3,13 +3,15 @@
 //! ```text
 //! E = eᵘ,  S = r + d E        E/S² = 1/(S (r/E + d))
 //! E = e^(−1/x²)               2 E/x³ = { 0  where E ≤ 0;  2 E/x³  elsewhere }
+//! C = cosh u                  ln C = { |u| − ln 2  where C is infinite;  ln C  elsewhere },  ln S = { u + ln d  where S is infinite;  ln S  elsewhere }
 //! ```
 //!
 //! The slope E/S² of a logistic function 1/S is infinite over infinite where E is infinite, and zero in truth. Divided by
 //! E, a sum is finite there. An exponential whose exponent has a pole vanishes faster than any power grows: where it is
-//! zero, so is its product with poles.
+//! zero, so is its product with poles. The logarithm of a sum with an exponential, or of a hyperbolic cosine, is as large as its
+//! argument where that overflows.
 
-use super::facts::{factors_of, is_surely_positive, moves};
+use super::facts::{argument_of_logarithm, factors_of, is_surely_positive, moves};
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
@@ -105,9 +107,55 @@ fn has_pole(graph: &Graph, x: ExprId, n: i32, depth: usize) -> bool {
     }
 }
 
-/// S/E of a sum S of multiples of E and of what is at rest; `None` for other sums.
-fn sum_over(graph: &mut Graph, sum: ExprId, exponential: ExprId) -> Option<ExprId> {
-    let (constant, terms) = graph.as_sum(sum)?;
+/// The logarithm of a sum with an exponential or of a hyperbolic cosine, with its value where these are infinite; another one as it is.
+pub(super) fn logarithm_where_infinite(graph: &mut Graph, x: ExprId) -> ExprId {
+    let Some(argument) = argument_of_logarithm(graph, x) else {
+        return x;
+    };
+    let Some(value) = logarithm_of_infinite(graph, argument) else {
+        return x;
+    };
+    let most = graph.constant(Constant::float(f64::MAX));
+    graph.select(Comparison::Greater, argument, most, value, x)
+}
+
+/// |u| + ln (c/2) of c cosh u, and u + ln (c d) of c (r + d eᵘ).
+fn logarithm_of_infinite(graph: &mut Graph, x: ExprId) -> Option<ExprId> {
+    let (c, inner) = graph.as_multiple(x);
+    if c.is_negative() {
+        return None;
+    }
+    if let Node::Call {
+        function: Function::Cosh,
+        arguments,
+    } = graph.node(inner)
+    {
+        let arguments = arguments.clone();
+        let size = graph.call(Function::Abs, &arguments);
+        let half = graph.constant(c * Constant::rational(1, 2)?);
+        let number = graph.call(Function::Ln, &[half]);
+        return Some(graph.add(size, number));
+    }
+    let (_, terms) = graph.as_sum(inner)?;
+    let mut factors = terms.iter().flat_map(|(_, term)| factors_of(graph, *term));
+    let exponential = factors.find(|(y, _)| exponent_of(graph, *y).is_some() && moves(graph, *y));
+    let exponential = exponential?.0;
+    let exponent = exponent_of(graph, exponential)?;
+    let (_, multiples) = parts_with(graph, inner, exponential)?;
+    let multiples = over(graph, multiples, exponential);
+    let multiple = graph.linear(Constant::ZERO, &multiples);
+    let multiple = graph.scale(c, multiple);
+    let number = graph.call(Function::Ln, &[multiple]);
+    Some(graph.add(exponent, number))
+}
+
+/// Terms with their coefficients.
+type Terms = Vec<(Constant, ExprId)>;
+
+/// The terms of a sum without an exponential, which are at rest, and its multiples of the exponential; `None` for other sums, and those
+/// without a multiple.
+fn parts_with(graph: &Graph, sum: ExprId, exponential: ExprId) -> Option<(Terms, Terms)> {
+    let (_, terms) = graph.as_sum(sum)?;
     let (mut multiples, mut others) = (Vec::new(), Vec::new());
     for (c, term) in terms {
         let factors = factors_of(graph, *term);
@@ -122,14 +170,25 @@ fn sum_over(graph: &mut Graph, sum: ExprId, exponential: ExprId) -> Option<ExprI
             _ => return None,
         }
     }
-    if multiples.is_empty() {
-        return None;
+    (!multiples.is_empty()).then_some((others, multiples))
+}
+
+/// Terms over an exponential.
+fn over(graph: &mut Graph, terms: Terms, exponential: ExprId) -> Terms {
+    let mut quotients = Terms::with_capacity(terms.len());
+    for (c, term) in terms {
+        quotients.push((c, graph.divide(term, exponential)));
     }
+    quotients
+}
+
+/// S/E of a sum S of multiples of E and of what is at rest; `None` for other sums.
+fn sum_over(graph: &mut Graph, sum: ExprId, exponential: ExprId) -> Option<ExprId> {
+    let (constant, _) = graph.as_sum(sum)?;
+    let (others, multiples) = parts_with(graph, sum, exponential)?;
     let rest = graph.linear(constant, &others);
     let mut divided = vec![(Constant::ONE, graph.divide(rest, exponential))];
-    for (c, term) in multiples {
-        divided.push((c, graph.divide(term, exponential)));
-    }
+    divided.extend(over(graph, multiples, exponential));
     Some(graph.linear(Constant::ZERO, &divided))
 }
 
