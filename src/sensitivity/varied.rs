@@ -16,7 +16,7 @@ pub(crate) type Velocity<'a, const N: usize, L> =
     Box<dyn Fn(&Change<N, L>) -> <L as Length<N>>::Vector + 'a>;
 
 /// A model whose runs have derivatives: every [`Model`] and every [`family::Model`], and nothing else.
-pub(crate) trait Varied<const N: usize, L: Length<N>>: Evaluate<N, L> {
+pub(crate) trait Varied<const N: usize, L: Length<N>> {
     /// The derivatives of the velocities at a node; NaN if the mass matrix is singular.
     fn velocity_along<'a>(&'a self, node: &'a Node<N, L>) -> Velocity<'a, N, L>;
 

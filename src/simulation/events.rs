@@ -3,6 +3,7 @@
 pub(super) mod act;
 mod clear;
 mod locate;
+pub(super) mod model;
 pub(super) mod on;
 mod order;
 mod remaining;

@@ -1,5 +1,6 @@
 //! The actions at events, and the data of an event that the caller receives.
 
+use super::model::EventModel;
 use super::remodel::{Changed, Remodel};
 use super::settings::Settings;
 use super::value::{Function, Value};
@@ -62,21 +63,33 @@ pub enum Act<const N: usize, L: Length<N> = FixedLength> {
 /// an [`Event`] (by dereference) that knows its model.
 pub struct Occurrence<'a, const N: usize, L: Length<N> = FixedLength> {
     event: &'a Event<N, L>,
-    model: &'a dyn Knows<N, L>,
+    model: &'a dyn EventModel<N, L>,
+    value: &'a Value<'a, L::Vector>,
+    /// A parameter and an increment, for a parameter that cannot be changed in the model itself.
+    larger: Option<(usize, f64)>,
+    /// The speed at which the surface was hit, if the state after an impact was asked for; otherwise zero.
+    impact: Cell<f64>,
 }
 
-/// The access of an event to its model, without the type of the model.
-trait Knows<const N: usize, L: Length<N>> {
-    fn momenta(&self, v: &L::Vector) -> L::Vector;
-    fn after_impact(&self, restitution: f64) -> L::State;
-    fn parameter(&self, name: &str) -> Option<f64>;
-}
+impl<'a, const N: usize, L: Length<N>> Occurrence<'a, N, L> {
+    fn new(
+        event: &'a Event<N, L>,
+        model: &'a dyn EventModel<N, L>,
+        value: &'a Value<'a, L::Vector>,
+    ) -> Self {
+        Self {
+            event,
+            model,
+            value,
+            larger: None,
+            impact: Cell::new(0.0),
+        }
+    }
 
-impl<const N: usize, L: Length<N>> Occurrence<'_, N, L> {
     /// The state with the same coordinates and other velocities. Its momenta are NaN if no momentum belongs to these
     /// velocities; the run then ends with an error.
     pub fn state_with_velocity(&self, v: L::Vector) -> L::State {
-        L::state(self.event.q.clone(), self.model.momenta(&v))
+        L::state(self.event.q.clone(), self.momenta(&v))
     }
 
     /// The state after a frictionless impact on the surface g(t, q) = 0, where g is the function of this event, with
@@ -119,65 +132,20 @@ impl<const N: usize, L: Length<N>> Occurrence<'_, N, L> {
     /// # }
     /// ```
     pub fn after_impact(&self, restitution: f64) -> L::State {
-        self.model.after_impact(restitution)
+        self.rebound(restitution)
+            .unwrap_or_else(|| L::state(self.event.q.clone(), L::unknown(&self.event.q)))
     }
 
     /// The current value of a parameter of the model, including changes that earlier events have [set](Act::Set);
     /// `None` if the model has no parameter of this name.
     pub fn parameter(&self, name: &str) -> Option<f64> {
-        self.model.parameter(name)
+        let names = self.model.parameter_names();
+        let index = names.iter().position(|own| own.is(name))?;
+        let larger = self.larger.filter(|(own, _)| *own == index);
+        Some(self.model.parameter_value(index) + larger.map_or(0.0, |(_, larger)| larger))
     }
-}
 
-impl<const N: usize, L: Length<N>> Deref for Occurrence<'_, N, L> {
-    type Target = Event<N, L>;
-
-    fn deref(&self) -> &Event<N, L> {
-        self.event
-    }
-}
-
-impl<const N: usize, L: Length<N>> fmt::Debug for Occurrence<'_, N, L> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.event.fmt(f)
-    }
-}
-
-type Action<'m, const N: usize, L> =
-    Arc<dyn Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm>;
-
-/// An event to be watched: its function, its direction and its action.
-#[derive(Clone)]
-pub(in crate::simulation) struct On<'m, const N: usize, L: Length<N> = FixedLength> {
-    pub(in crate::simulation) name: String,
-    /// `None` for the output with this name.
-    pub(in crate::simulation) function: Option<Function<'m, L::Vector>>,
-    pub(in crate::simulation) crossing: Crossing,
-    pub(in crate::simulation) act: Action<'m, N, L>,
-}
-
-impl<const N: usize, L: Length<N>> fmt::Debug for On<'_, N, L> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {:?}", self.name, self.crossing)
-    }
-}
-
-/// An event together with its model.
-struct Knowing<'a, 'm, M, const N: usize, L: Length<N>> {
-    model: &'a M,
-    event: &'a Event<N, L>,
-    value: &'a Value<'m, L::Vector>,
-    /// A parameter and an increment, for a parameter that cannot be changed in the model itself.
-    larger: Option<(usize, f64)>,
-    /// The speed at which the surface was hit, if the state after an impact was asked for; otherwise zero.
-    impact: Cell<f64>,
-}
-
-impl<M, L, const N: usize> Knows<N, L> for Knowing<'_, '_, M, N, L>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+    /// The momenta of given velocities at the event.
     fn momenta(&self, v: &L::Vector) -> L::Vector {
         let Event { t, q, .. } = self.event;
         let p = self.model.momenta(*t, q, v);
@@ -189,15 +157,13 @@ where
         L::from_fn(q, |a| p[a] + larger * slopes[a])
     }
 
-    fn after_impact(&self, restitution: f64) -> L::State {
+    /// The state after an impact; `None` if there is none.
+    fn rebound(&self, restitution: f64) -> Option<L::State> {
         let Event { t, q, p, v, .. } = self.event;
-        let unknown = || L::state(q.clone(), L::unknown(q));
         if self.larger.is_some() {
-            return unknown();
+            return None;
         }
-        let Some((normal, drift)) = self.value.normal(self.model, self.event) else {
-            return unknown();
-        };
+        let (normal, drift) = self.value.normal(self.model, self.event)?;
         let rate = |v: &L::Vector| {
             let products = normal.as_ref().iter().zip(v.as_ref());
             drift + products.map(|(n, v)| n * v).sum::<f64>()
@@ -239,20 +205,44 @@ where
         }
         // The rounding error that the momenta cause.
         let roundings = 16.0 * f64::EPSILON * steepest * first;
-        let Some(after) = after.filter(|_| least <= 1e-9 * rate(v).abs() + roundings) else {
-            return unknown();
-        };
+        let after = after.filter(|_| least <= 1e-9 * rate(v).abs() + roundings)?;
         if restitution >= 0.0 {
             self.impact.set(rate(v).abs());
         }
-        L::state(q.clone(), self.model.momenta(*t, q, &after))
+        Some(L::state(q.clone(), self.model.momenta(*t, q, &after)))
     }
+}
 
-    fn parameter(&self, name: &str) -> Option<f64> {
-        let names = self.model.parameter_names();
-        let index = names.iter().position(|own| own.is(name))?;
-        let larger = self.larger.filter(|(own, _)| *own == index);
-        Some(self.model.parameter_value(index) + larger.map_or(0.0, |(_, larger)| larger))
+impl<const N: usize, L: Length<N>> Deref for Occurrence<'_, N, L> {
+    type Target = Event<N, L>;
+
+    fn deref(&self) -> &Event<N, L> {
+        self.event
+    }
+}
+
+impl<const N: usize, L: Length<N>> fmt::Debug for Occurrence<'_, N, L> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.event.fmt(f)
+    }
+}
+
+type Action<'m, const N: usize, L> =
+    Arc<dyn Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm>;
+
+/// An event to be watched: its function, its direction and its action.
+#[derive(Clone)]
+pub(in crate::simulation) struct On<'m, const N: usize, L: Length<N> = FixedLength> {
+    pub(in crate::simulation) name: String,
+    /// `None` for the output with this name.
+    pub(in crate::simulation) function: Option<Function<'m, L::Vector>>,
+    pub(in crate::simulation) crossing: Crossing,
+    pub(in crate::simulation) act: Action<'m, N, L>,
+}
+
+impl<const N: usize, L: Length<N>> fmt::Debug for On<'_, N, L> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {:?}", self.name, self.crossing)
     }
 }
 
@@ -267,22 +257,18 @@ pub(in crate::simulation) struct Near<const N: usize, L: Length<N>> {
 }
 
 /// The state that an action makes of the state at a perturbed event; `None` if the action only records or stops.
-pub(in crate::simulation) fn state_after<M, L, const N: usize>(
-    model: &M,
+pub(in crate::simulation) fn state_after<L: Length<N>, const N: usize>(
+    model: &dyn EventModel<N, L>,
     (on, value): (&On<'_, N, L>, &Value<'_, L::Vector>),
     event: &Event<N, L>,
     near: &Near<N, L>,
-) -> Option<L::State>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+) -> Option<L::State> {
     let (t, state) = (near.t, &near.state);
-    let other = near
-        .parameter
-        .and_then(|(index, larger)| model.with_value(index, model.parameter_value(index) + larger));
+    let other = near.parameter.and_then(|(index, larger)| {
+        model.with_values(&[(index, model.parameter_value(index) + larger)])
+    });
     let (model, larger) = match &other {
-        Some(other) => (other, None),
+        Some(other) => (&**other, None),
         None => (model, near.parameter),
     };
     let found = model.velocity(t, state, &event.v);
@@ -301,14 +287,8 @@ where
         rises: event.rises,
     };
     let act = (on.act)(&Occurrence {
-        event: &event,
-        model: &Knowing {
-            model,
-            event: &event,
-            value,
-            larger,
-            impact: Cell::new(0.0),
-        },
+        larger,
+        ..Occurrence::new(&event, model, value)
     });
     match act {
         Act::Restart(state) => Some(state),
@@ -320,28 +300,15 @@ where
 
 /// Calls the action of an event. Also returns the speed at which the surface was hit if the state after an impact was
 /// asked for, otherwise zero.
-pub(super) fn act<M, L, const N: usize>(
-    model: &M,
+pub(super) fn act<L: Length<N>, const N: usize>(
+    model: &dyn EventModel<N, L>,
     (on, value): (&On<'_, N, L>, &Value<'_, L::Vector>),
     event: &Event<N, L>,
-) -> (Act<N, L>, f64)
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
-    let knowing = Knowing {
-        model,
-        event,
-        value,
-        larger: None,
-        impact: Cell::new(0.0),
-    };
-    let act = (on.act)(&Occurrence {
-        event,
-        model: &knowing,
-    });
+) -> (Act<N, L>, f64) {
+    let occurrence = Occurrence::new(event, model, value);
+    let act = (on.act)(&occurrence);
     let impact = match act {
-        Act::Restart(_) => knowing.impact.get(),
+        Act::Restart(_) => occurrence.impact.get(),
         _ => 0.0,
     };
     (act, impact)
@@ -382,16 +349,12 @@ where
 }
 
 /// The state after an impulse; constraints react to the part of it that violates them.
-fn kicked<M, L, const N: usize>(
-    model: &M,
+fn kicked<L: Length<N>, const N: usize>(
+    model: &dyn EventModel<N, L>,
     t: f64,
     state: &L::State,
     impulse: &L::Vector,
-) -> L::State
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+) -> L::State {
     let (q, p) = L::parts(state);
     let more = impulse.as_ref();
     if more.len() != p.as_ref().len() {
@@ -400,7 +363,7 @@ where
     }
     let p = L::from_fn(p, |a| p.as_ref()[a] + more[a]);
     let kicked = L::state(q.clone(), p);
-    if M::IS_CONSTRAINED
+    if model.is_constrained()
         && let Some(v) = model.allowed_velocity(t, &kicked, &L::zero(q))
     {
         return L::state(q.clone(), model.momenta(t, q, &v));

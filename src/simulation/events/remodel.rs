@@ -19,10 +19,19 @@ where
     M: Simulated<N, L> + Send + Sync + 'm,
     L: Length<N>,
 {
+    changed(model, values).map(Share::own)
+}
+
+/// The same model with other values of some parameters.
+pub(super) fn changed<M, const N: usize, L>(model: &M, values: &[(usize, f64)]) -> Option<M>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
     let ((first, value), others) = values.split_first()?;
     let mut made = model.with_value(*first, *value)?;
     for (number, value) in others {
         made = made.with_value(*number, *value)?;
     }
-    Some(Share::own(made))
+    Some(made)
 }

@@ -1,5 +1,6 @@
 //! Values of parameters that events set.
 
+use super::model::EventModel;
 use super::remodel::{Changed, Remodel};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
@@ -125,7 +126,7 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
     }
 
     /// The state from which the run continues, for the model with the new values.
-    pub(super) fn state<M: Simulated<N, L>>(&self, model: &M, event: &Event<N, L>) -> L::State {
+    pub(super) fn state(&self, model: &dyn EventModel<N, L>, event: &Event<N, L>) -> L::State {
         match &self.from {
             From::Here => event.state(),
             From::State(state) => state.clone(),
@@ -134,19 +135,15 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
     }
 
     /// The same for a model that still has the old values.
-    pub(super) fn state_nearby<M: Simulated<N, L>>(
+    pub(super) fn state_nearby(
         &self,
-        model: &M,
+        model: &dyn EventModel<N, L>,
         event: &Event<N, L>,
     ) -> Option<L::State> {
         if let From::Velocity(_) = self.from {
-            let mut values = self.values.iter();
-            let (name, value) = values.next()?;
-            let mut made = model.with(name, *value)?;
-            for (name, value) in values {
-                made = made.with(name, *value)?;
-            }
-            return Some(self.state(&made, event));
+            let values = self.numbered(&model.parameter_names()).ok()?;
+            let made = model.with_values(&values)?;
+            return Some(self.state(&*made, event));
         }
         Some(self.state(model, event))
     }

@@ -1,11 +1,11 @@
 //! The function whose zeros are the events.
 
+use super::model::EventModel;
 use crate::differences::{derivative_by_time, derivative_of_either, resolved};
 use crate::length::Length;
 use crate::motion::Event;
 use crate::numbers::largest;
 use crate::sensitivity::slopes::Change;
-use crate::simulation::kind::Simulated;
 use std::sync::Arc;
 use tfe_runtime::dual::Dual;
 
@@ -28,21 +28,17 @@ pub(in crate::simulation) const DISTANCE_IN_TIME: f64 = 1.570_796e-3;
 
 impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
     /// The gradients g_q and g_t; `None` if g depends on velocities.
-    pub(super) fn normal<M, L, const N: usize>(
+    pub(super) fn normal<L: Length<N, Vector = V>, const N: usize>(
         &self,
-        model: &M,
+        model: &dyn EventModel<N, L>,
         event: &Event<N, L>,
-    ) -> Option<(V, f64)>
-    where
-        M: Simulated<N, L>,
-        L: Length<N, Vector = V>,
-    {
+    ) -> Option<(V, f64)> {
         let Event { t, q, v, .. } = event;
         match self {
             Self::Column(column) => {
                 let unit = |a: usize| L::from_fn(q, |b| if a == b { 1.0 } else { 0.0 });
                 let (still, coordinates) = (L::zero(q), q.as_ref().len());
-                let z = if M::NEEDS_VELOCITY { v } else { &event.p };
+                let z = if model.needs_velocity() { v } else { &event.p };
                 let mut values = vec![Dual::ZERO; model.output_count()];
                 let mut slope = |dt: f64, dq: &V, dz: &V| {
                     model.outputs_towards(Dual::new(*t, dt), (q, dq), (z, dz), &mut values);
@@ -81,15 +77,11 @@ fn normal_of<L: Length<N>, const N: usize>(
 
 impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
     /// The value of g at an event.
-    pub(in crate::simulation) fn at<M, L, const N: usize>(
+    pub(in crate::simulation) fn at<L: Length<N, Vector = V>, const N: usize>(
         &self,
-        model: &M,
+        model: &dyn EventModel<N, L>,
         event: &Event<N, L>,
-    ) -> f64
-    where
-        M: Simulated<N, L>,
-        L: Length<N, Vector = V>,
-    {
+    ) -> f64 {
         let Event { t, q, p, v, .. } = event;
         match self {
             Self::Column(column) => {
@@ -102,17 +94,13 @@ impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
     }
 
     /// The derivative of g along a change, whose change of the velocity is `velocity`.
-    pub(in crate::simulation) fn slope<M, L, const N: usize>(
+    pub(in crate::simulation) fn slope<L: Length<N, Vector = V>, const N: usize>(
         &self,
-        model: &M,
+        model: &dyn EventModel<N, L>,
         event: &Event<N, L>,
         change: &Change<N, L>,
         velocity: &V,
-    ) -> f64
-    where
-        M: Simulated<N, L>,
-        L: Length<N, Vector = V>,
-    {
+    ) -> f64 {
         match self {
             Self::Column(column) => {
                 let Event { t, q, p, v, .. } = event;
@@ -158,18 +146,14 @@ impl<V: AsRef<[f64]> + Clone> Value<'_, V> {
 }
 
 /// The changes of all outputs at a point of a motion, given the change of the velocity.
-pub(in crate::simulation) fn output_slopes<M, L, const N: usize>(
-    model: &M,
+pub(in crate::simulation) fn output_slopes<L: Length<N>, const N: usize>(
+    model: &dyn EventModel<N, L>,
     (t, q, p, v): (f64, &L::Vector, &L::Vector, &L::Vector),
     change: &Change<N, L>,
     velocity: &L::Vector,
-) -> Vec<f64>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+) -> Vec<f64> {
     let time = Dual::new(t, change.t).by_parameter(change.parameter);
-    let z = match M::NEEDS_VELOCITY {
+    let z = match model.needs_velocity() {
         true => (v, velocity),
         false => (p, &change.p),
     };

@@ -267,7 +267,7 @@ impl<M: family::Model> Pass<'_, '_, M> {
         let jump = Jump::at(self.to.model, &severed, &node, &column);
         if severed.goes_on {
             let lambda = self.to.adjoint.take_by_state();
-            let given = jump.given(&lambda).map_err(failed)?;
+            let given = jump.given(self.to.model, &lambda).map_err(failed)?;
             self.pass_action(&node, &given)?;
         }
         for number in nodes {

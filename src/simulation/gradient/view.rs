@@ -11,6 +11,7 @@ use crate::sensitivity::slopes::Change;
 use crate::sensitivity::varied::Varied;
 use crate::simulation::events::value::output_slopes;
 use crate::simulation::kind::Simulated;
+use crate::simulation::sensitive::jump::VariedModel;
 use tfe_runtime::step::DenseElement;
 use tfe_runtime::{InsideLoss, Model, Partials, Pull, Sight, State};
 #[cfg(feature = "sparse")]
@@ -244,11 +245,10 @@ impl<M: Model<N>, const N: usize> View<'_, M, N> {
 }
 
 /// The derivatives of the velocity and of the outputs by the time, at a fixed state.
-fn by_time<M, L, const N: usize>(model: &M, node: &Node<N, L>) -> (L::Vector, Vec<f64>)
-where
-    M: Simulated<N, L> + Varied<N, L>,
-    L: Length<N>,
-{
+fn by_time<L: Length<N>, const N: usize>(
+    model: &dyn VariedModel<N, L>,
+    node: &Node<N, L>,
+) -> (L::Vector, Vec<f64>) {
     let change = Change {
         t: 1.0,
         ..Change::<N, L>::by(None, &node.q)

@@ -8,7 +8,6 @@ use crate::numbers::{larger, largest};
 use crate::sensitivity::slopes::Change;
 use crate::simulation::events::Watched;
 use crate::simulation::events::act::{Act, Near, Occurrence, On, state_after};
-use crate::simulation::kind::Simulated;
 use nalgebra::DMatrix;
 use std::sync::{Arc, Mutex, PoisonError};
 use tfe_runtime::StepError;
@@ -18,8 +17,8 @@ use tfe_runtime::transition::TransitionError;
 pub(super) const DISTANCE: f64 = 2e-3;
 
 /// An event with the derivatives of its state and of its time before the action.
-pub(super) struct Acting<'a, 'm, M, const N: usize, L: Length<N>> {
-    pub(super) jump: &'a Jump<'a, 'm, M, N, L>,
+pub(super) struct Acting<'a, 'm, const N: usize, L: Length<N>> {
+    pub(super) jump: &'a Jump<'a, 'm, N, L>,
     /// The derivatives of the state at the event, a column for each component of the start and each parameter.
     pub(super) at: &'a DMatrix<f64>,
     /// The derivatives of its time.
@@ -45,11 +44,7 @@ fn scale(size: f64) -> f64 {
     if size > 0.0 { size } else { 1.0 }
 }
 
-impl<M, const N: usize, L> Jump<'_, '_, M, N, L>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+impl<const N: usize, L: Length<N>> Jump<'_, '_, N, L> {
     /// No motion.
     pub(super) fn still(&self) -> Way<N, L> {
         let event = self.severed.event;
@@ -110,7 +105,7 @@ where
     pub(super) fn moved(&self, way: &Way<N, L>, s: f64) -> Result<Vec<f64>, TransitionError> {
         let by = (&self.severed.watched.on, &self.severed.watched.value);
         let found = state_after(self.model, by, self.severed.event, &self.near(way, s));
-        let found = found.filter(|found| self.model.check_start(found, &[]).is_ok());
+        let found = found.filter(|found| self.model.check_start(found).is_ok());
         let found = found.ok_or(TransitionError::from(StepError::NonFinite))?;
         let (q, p) = L::parts(&found);
         Ok([p.as_ref(), q.as_ref()].concat())
@@ -122,7 +117,7 @@ where
         &self,
         way: &Way<N, L>,
         longer: f64,
-        of: impl Fn(&[f64]) -> f64,
+        of: &dyn Fn(&[f64]) -> f64,
     ) -> Result<f64, TransitionError> {
         let slope = derivative_of_either([longer, way.distance], |s| {
             let numbers = self.moved(way, s);
@@ -153,15 +148,11 @@ where
     }
 }
 
-impl<M, const N: usize, L> Acting<'_, '_, M, N, L>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+impl<const N: usize, L: Length<N>> Acting<'_, '_, N, L> {
     /// The derivatives after the action; `parameter` returns the parameter of a column.
     pub(super) fn after(
         &self,
-        parameter: impl Fn(usize) -> Option<usize>,
+        parameter: &dyn Fn(usize) -> Option<usize>,
     ) -> Result<DMatrix<f64>, TransitionError> {
         let jump = self.jump;
         let mut after = self.at.clone();
@@ -170,7 +161,7 @@ where
             for way in self.ways(column, parameter(column)) {
                 if let Some(longer) = way.longer {
                     for (row, after) in after.iter_mut().enumerate() {
-                        *after += jump.derivative(&way, longer, |numbers| numbers[row])?;
+                        *after += jump.derivative(&way, longer, &|numbers| numbers[row])?;
                     }
                     continue;
                 }

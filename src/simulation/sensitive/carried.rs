@@ -1,17 +1,15 @@
 //! The derivatives along a run of a model of either kind of length: over events, and at recorded nodes (T-124).
 
 use super::acts::Acting;
-use super::jump::Jump;
+use super::jump::{Jump, VariedModel};
 use crate::error::RunErrorKind;
 use crate::length::Length;
 use crate::motion::{Event, Motion, Node};
 use crate::sensitivity::inside::{Before, Inside, Moved};
 use crate::sensitivity::slopes::Change;
-use crate::sensitivity::varied::Varied;
 use crate::sensitivity::{Sensitive, Slopes};
 use crate::simulation::events::Severed;
 use crate::simulation::events::value::output_slopes;
-use crate::simulation::kind::Simulated;
 use nalgebra::{DMatrix, RowDVector};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{CoordinateName, Direction, InsideSlopes};
@@ -145,15 +143,11 @@ impl Carried {
     }
 
     /// The derivatives at an event at the start of an element, before its action.
-    pub(in crate::simulation) fn at_start<M, L, const N: usize>(
+    pub(in crate::simulation) fn at_start<L: Length<N>, const N: usize>(
         &self,
-        model: &M,
+        model: &dyn VariedModel<N, L>,
         event: &Event<N, L>,
-    ) -> Reached
-    where
-        M: Varied<N, L>,
-        L: Length<N>,
-    {
+    ) -> Reached {
         let node = Node::of(event.t, &event.state(), event.v.clone());
         let push = model.push(&node);
         let both = push.as_ref().iter().chain(event.v.as_ref());
@@ -169,17 +163,13 @@ impl Carried {
     }
 
     /// The derivatives of the time of an event by each column, from those of the state at a fixed time.
-    pub(in crate::simulation) fn times<M, L, const N: usize>(
+    pub(in crate::simulation) fn times<L: Length<N>, const N: usize>(
         &self,
-        jump: &Jump<'_, '_, M, N, L>,
+        jump: &Jump<'_, '_, N, L>,
         at: &DMatrix<f64>,
-    ) -> Result<Vec<f64>, TransitionError>
-    where
-        M: Simulated<N, L> + Varied<N, L>,
-        L: Length<N>,
-    {
+    ) -> Result<Vec<f64>, TransitionError> {
         let start = self.before.start.as_deref();
-        jump.times(at, start, |column| self.parameter(column))
+        jump.times(at, start, &|column| self.parameter(column))
     }
 
     /// Keeps the derivatives along an element; `ends` are the derivatives of its end time, if an event ends it.
@@ -226,17 +216,13 @@ impl Carried {
     }
 
     /// Continues from an event that cuts an element, and keeps the derivatives along the part before it, if given.
-    pub(in crate::simulation) fn cut<M, L, const N: usize>(
+    pub(in crate::simulation) fn cut<L: Length<N>, const N: usize>(
         &mut self,
-        model: &M,
+        model: &dyn VariedModel<N, L>,
         severed: &Severed<'_, '_, N, L>,
         mut reached: Reached,
         along: Option<Along>,
-    ) -> Result<(), TransitionError>
-    where
-        M: Simulated<N, L> + Varied<N, L>,
-        L: Length<N>,
-    {
+    ) -> Result<(), TransitionError> {
         let event = severed.event;
         let node = Node::of(event.t, &event.state(), event.v.clone());
         let jump = Jump::at(model, severed, &node, &reached.rate);
@@ -255,7 +241,7 @@ impl Carried {
                 at,
                 times: &times,
             };
-            self.acted = Some(acting.after(|column| self.parameter(column))?);
+            self.acted = Some(acting.after(&|column| self.parameter(column))?);
             // If derivatives by parameters are asked for, actions that set parameters are refused.
             if self.indices.is_empty() {
                 self.dependent = acting.dependent();
@@ -287,14 +273,11 @@ impl Carried {
     }
 
     /// Keeps the derivatives at a recorded node.
-    pub(in crate::simulation) fn recorded<M, L, const N: usize>(
+    pub(in crate::simulation) fn recorded<L: Length<N>, const N: usize>(
         &mut self,
-        model: &M,
+        model: &dyn VariedModel<N, L>,
         node: &Node<N, L>,
-    ) where
-        M: Simulated<N, L> + Varied<N, L>,
-        L: Length<N>,
-    {
+    ) {
         let velocity_along = model.velocity_along(node);
         let columns = self.columns();
         let mut slopes = Slopes {

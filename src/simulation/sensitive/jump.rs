@@ -5,18 +5,31 @@ use crate::motion::Node;
 use crate::sensitivity::slopes::Change;
 use crate::sensitivity::varied::{Varied, Velocity};
 use crate::simulation::events::Severed;
-use crate::simulation::kind::Simulated;
+use crate::simulation::events::model::EventModel;
 use nalgebra::DMatrix;
 use tfe_runtime::StepError;
 use tfe_runtime::transition::TransitionError;
+
+/// A model whose runs have derivatives, without its type; implemented for every such model.
+pub(in crate::simulation) trait VariedModel<const N: usize, L: Length<N>>:
+    EventModel<N, L> + Varied<N, L>
+{
+}
+
+impl<M, const N: usize, L> VariedModel<N, L> for M
+where
+    M: EventModel<N, L> + Varied<N, L>,
+    L: Length<N>,
+{
+}
 
 /// The derivative of the state after an event by the state before it at a fixed time, and by parameters.
 ///
 /// ```text
 /// δt* = −(g_y δy + g_a δa) / ġ ,     δy* = δy + ẏ δt* ,     δy₊ = S_y δy* + S_t δt* + S_a δa            (T-124)
 /// ```
-pub(in crate::simulation) struct Jump<'a, 'm, M, const N: usize, L: Length<N>> {
-    pub(super) model: &'a M,
+pub(in crate::simulation) struct Jump<'a, 'm, const N: usize, L: Length<N>> {
+    pub(super) model: &'a dyn EventModel<N, L>,
     pub(super) severed: &'a Severed<'a, 'm, N, L>,
     /// The change of the velocity for a change at the event.
     pub(super) velocity: Velocity<'a, N, L>,
@@ -27,14 +40,10 @@ pub(in crate::simulation) struct Jump<'a, 'm, M, const N: usize, L: Length<N>> {
     pub(super) slope: Option<f64>,
 }
 
-impl<'a, 'm, M, const N: usize, L> Jump<'a, 'm, M, N, L>
-where
-    M: Simulated<N, L> + Varied<N, L>,
-    L: Length<N>,
-{
+impl<'a, 'm, const N: usize, L: Length<N>> Jump<'a, 'm, N, L> {
     /// The jump at an event with its node before the action, where ẏ is the only column of `rate`.
     pub(in crate::simulation) fn at(
-        model: &'a M,
+        model: &'a dyn VariedModel<N, L>,
         severed: &'a Severed<'a, 'm, N, L>,
         node: &'a Node<N, L>,
         rate: &DMatrix<f64>,
@@ -76,7 +85,7 @@ where
         &self,
         at: &DMatrix<f64>,
         start: Option<&[f64]>,
-        parameter: impl Fn(usize) -> Option<usize>,
+        parameter: &dyn Fn(usize) -> Option<usize>,
     ) -> Result<Vec<f64>, TransitionError> {
         let columns = at.ncols();
         let Some(slope) = self.slope else {

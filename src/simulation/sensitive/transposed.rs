@@ -21,7 +21,7 @@ pub(in crate::simulation) struct Given {
 /// A motion of an event, with a longer step of differences.
 type Longer = (Way<0, RunTimeLength>, f64);
 
-impl<M: family::Model> Jump<'_, '_, M, 0, RunTimeLength> {
+impl Jump<'_, '_, 0, RunTimeLength> {
     /// λ S_y, λ S_t and λ S_a of the row λ = `lambda`, the derivatives by the state after the action in the order
     /// (p, q).
     ///
@@ -30,8 +30,12 @@ impl<M: family::Model> Jump<'_, '_, M, 0, RunTimeLength> {
     ///
     /// # Errors
     /// [`StepError::NonFinite`] if the action has no state nearby.
-    pub(in crate::simulation) fn given(&self, lambda: &[f64]) -> Result<Given, TransitionError> {
-        let parameters: Vec<usize> = (0..self.model.parameters()).collect();
+    pub(in crate::simulation) fn given<M: family::Model>(
+        &self,
+        model: &M,
+        lambda: &[f64],
+    ) -> Result<Given, TransitionError> {
+        let parameters: Vec<usize> = (0..model.parameters()).collect();
         if lambda.iter().all(|weight| *weight == 0.0) {
             return Ok(Given {
                 by_state: vec![0.0; lambda.len()],
@@ -39,10 +43,10 @@ impl<M: family::Model> Jump<'_, '_, M, 0, RunTimeLength> {
                 by_parameters: vec![0.0; parameters.len()],
             });
         }
-        let allowed = self.allowed(&parameters)?;
+        let allowed = self.allowed(model, &parameters)?;
         let allowed = allowed.as_ref();
         let of = |numbers: &[f64]| product(lambda, numbers);
-        let along = |(way, longer): Longer| self.derivative(&way, longer, of);
+        let along = |(way, longer): Longer| self.derivative(&way, longer, &of);
         let components = (0..lambda.len()).map(|row| along(self.component(row, allowed)));
         let by_state = components.collect::<Result<Vec<_>, _>>()?;
         let by_parameters = parameters.iter().map(|index| match allowed {
@@ -71,12 +75,16 @@ impl<M: family::Model> Jump<'_, '_, M, 0, RunTimeLength> {
     }
 
     /// The changes that the constraints allow at the event; `None` without constraints.
-    fn allowed(&self, parameters: &[usize]) -> Result<Option<Allowed>, TransitionError> {
+    fn allowed<M: family::Model>(
+        &self,
+        model: &M,
+        parameters: &[usize],
+    ) -> Result<Option<Allowed>, TransitionError> {
         if !M::CONSTRAINED {
             return Ok(None);
         }
         let event = self.severed.event;
-        let allowed = Allowed::of(self.model, event.t, &event.state(), parameters);
+        let allowed = Allowed::of(model, event.t, &event.state(), parameters);
         let allowed = allowed.map_err(|error| match error {
             OperatorError::Step(error) => error,
             _ => StepError::NonFinite,
@@ -103,7 +111,8 @@ impl<M: family::Model> Jump<'_, '_, M, 0, RunTimeLength> {
 
     /// A change of one component of the state, in the order (p, q), as far as constraints allow it.
     fn component(&self, row: usize, allowed: Option<&Allowed>) -> Longer {
-        let (event, n) = (self.severed.event, self.model.len());
+        let event = self.severed.event;
+        let n = event.q.len();
         let (value, rate) = match row.checked_sub(n) {
             None => (event.p[row], self.rate.p[row]),
             Some(a) => (event.q[a], self.rate.q[a]),
@@ -156,8 +165,8 @@ impl<M: family::Model> Jump<'_, '_, M, 0, RunTimeLength> {
             return Err(StepError::NonFinite.into());
         }
         let (event, value) = (self.severed.event, &self.severed.watched.value);
-        let n = self.model.len();
-        let mut partials = Partials::none(n, self.model.columns());
+        let n = event.q.len();
+        let mut partials = Partials::none(n, self.model.output_count());
         if let Value::Column(column) = value {
             partials.outputs[*column] = factor;
             return Ok(Some(partials));
