@@ -9,24 +9,24 @@ mod order;
 mod remaining;
 pub(super) mod remodel;
 mod search;
+pub(super) mod searched;
 pub(super) mod settings;
 pub(super) mod value;
 pub(super) mod watching;
 
 use super::acting;
-use super::kind::{Chosen, Simulated};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length, Polynomial};
 use crate::motion::{LastCut, Seen};
 use act::{Act, After, Event, On};
 use clear::Clear;
+use model::EventModel;
 use remaining::{Crossed, Remaining};
-use remodel::Remodel;
 use search::Course;
+use searched::Searched;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::fmt;
-use tfe_runtime::Share;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::Impulse;
@@ -39,20 +39,23 @@ pub struct Watched<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(super) value: Value<'m, L::Vector>,
 }
 
+impl<const N: usize, L: Length<N>> Watched<'_, N, L> {
+    /// Whether it is a function given by the user.
+    fn is_function(&self) -> bool {
+        matches!(self.value, Value::Function(_))
+    }
+}
+
 /// The search for the events of a run.
-pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
-    model: Share<'m, M>,
-    remodel: Option<Remodel<'m, M>>,
+pub(super) struct Events<'m, const N: usize, L: Length<N> = FixedLength> {
     watched: Vec<Watched<'m, N, L>>,
+    /// Whether a watched function depends on the velocity. Functions of a Hamiltonian depend on the momentum instead.
+    needs_velocity: bool,
     pub(super) seen: Seen,
     /// Events at the time of the last cut, or missed before it, that are still to be met.
     due: VecDeque<Crossed>,
-    /// The element and the control of the steps that locate events; those of the run.
-    chosen: Chosen,
     rooms: Rooms,
     clear: Clear,
-    /// The stepper that locates events; separate from that of the run.
-    probe: Option<L::Stepper<'m, M>>,
     pub(super) met: Vec<Event<N, L>>,
     /// The events in the last element that did not end it.
     recorded: Vec<Place>,
@@ -62,7 +65,7 @@ pub(super) struct Events<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> 
     step: f64,
 }
 
-impl<M, const N: usize, L: Length<N>> fmt::Debug for Events<'_, M, N, L> {
+impl<const N: usize, L: Length<N>> fmt::Debug for Events<'_, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let names = self.watched.iter().map(|watched| &watched.on);
         f.debug_list().entries(names).finish()
@@ -144,12 +147,12 @@ struct Place {
 }
 
 /// An element that was shortened to end at an event.
-pub(super) struct Cut<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+pub(super) struct Cut<const N: usize, L: Length<N> = FixedLength> {
     pub(super) t: f64,
     pub(super) at: L::State,
     pub(super) inside: Option<L::Polynomial>,
     /// How the run continues; `None` if it ends here.
-    pub(super) after: Option<After<'m, M, N, L>>,
+    pub(super) after: Option<After<N, L>>,
     place: Place,
 }
 
@@ -176,31 +179,22 @@ pub struct Severed<'a, 'm, const N: usize, L: Length<N> = FixedLength> {
 }
 
 /// The result of the action at an event that ends an element.
-struct Done<'m, M: 'm, const N: usize, L: Length<N>> {
+struct Done<const N: usize, L: Length<N>> {
     place: Place,
     /// How the run continues; `None` if it ends here.
-    after: Option<After<'m, M, N, L>>,
+    after: Option<After<N, L>>,
 }
 
-impl<'m, M, const N: usize, L> Events<'m, M, N, L>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
     /// The largest number of events in one step; with more, events are taken to accumulate (Zeno behaviour).
     const MAX_CUTS: u32 = 1000;
 
     /// Events also accumulate if one recurs this soon, relative to the step: later ones are lost in rounding error.
     const SOON: f64 = 1e-6;
 
-    /// Replaces the model.
-    pub(super) fn set_model(&mut self, model: Share<'m, M>) {
-        (self.model, self.probe) = (model, None);
-        self.clear.forget();
-    }
-
-    /// The inputs have changed. Known signs stay, so that a function that jumps over zero by this is met at once.
-    pub(super) fn set_inputs(&mut self) {
+    /// The model or its inputs have changed. Known signs stay, so that a function that jumps over zero by a change of
+    /// inputs is met at once.
+    pub(super) fn forget_bounds(&mut self) {
         self.clear.forget();
     }
 
@@ -213,35 +207,32 @@ where
     /// Whether bounds prove that no watched function vanishes in the last element; cheaper than its polynomial.
     pub(super) fn stays_clear(
         &mut self,
-        stepper: &mut L::Stepper<'m, M>,
+        run: &mut dyn Searched<N, L>,
         element: (f64, f64),
     ) -> bool {
-        let within = |bounds: &[(f64, f64)]| M::reaches_within(stepper, bounds);
-        (self.clear.holds(element, within) || self.look_about(stepper, element))
+        let within = |bounds: &[(f64, f64)]| run.reaches_within(bounds);
+        (self.clear.holds(element, within) || self.look_about(run, element))
             && self.clear.agree(&mut self.seen.sides)
     }
 
     #[cold]
-    fn look_about(&mut self, stepper: &mut L::Stepper<'m, M>, element: (f64, f64)) -> bool {
-        if self.has_functions() {
+    fn look_about(&mut self, run: &mut dyn Searched<N, L>, element: (f64, f64)) -> bool {
+        let has_begun =
+            !self.has_functions() && (self.clear).begin(element, &mut |reached| run.reach(reached));
+        if !has_begun {
             return false;
         }
-        let (model, watched) = (&self.model, &self.watched);
-        let mut values = self.rooms.bounds.borrow_mut();
-        self.clear.look(
-            element,
-            &mut |reached| M::reach(stepper, reached),
-            &mut |bounds, sides| {
-                if !model.outputs_within(bounds, &mut values) {
-                    return false;
-                }
-                sides.extend(watched.iter().map(|watched| match watched.value {
-                    Value::Column(column) => values[column].side(),
-                    Value::Function(_) => 0.0,
-                }));
-                true
-            },
-        )
+        let (watched, mut values) = (&self.watched, self.rooms.bounds.borrow_mut());
+        self.clear.look(element, &mut |bounds, sides| {
+            if !run.outputs_within(bounds, &mut values) {
+                return false;
+            }
+            sides.extend(watched.iter().map(|watched| match watched.value {
+                Value::Column(column) => values[column].side(),
+                Value::Function(_) => 0.0,
+            }));
+            true
+        })
     }
 
     /// Whether events at the time of the last cut are to be met before the run continues.
@@ -252,13 +243,15 @@ where
     /// Applies the actions at the events in an element, in the order of time, up to the first that ends the element.
     pub(super) fn pass(
         &mut self,
+        run: &mut dyn Searched<N, L>,
         arc: &Passage<'_, N, L>,
-    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
+    ) -> Result<Option<Cut<N, L>>, RunErrorKind> {
         let Passage { t, h, dense, .. } = *arc;
         self.recorded.clear();
-        if self.stays_off(dense) {
+        if self.stays_off(run, dense) {
             return Ok(None);
         }
+        let model = run.model();
         let resolution = 4.0 * f64::EPSILON * t.abs().max((t + h).abs()).max(h.abs());
         let samples = (2 * dense.degree()).clamp(8, 24);
         let value = |tau: f64, row: &mut Vec<f64>| {
@@ -266,22 +259,22 @@ where
             if 0.0 < tau && tau < 1.0 {
                 let state = dense.at_time(time);
                 let v = self.velocity_inside(dense, time, &state);
-                self.outputs(time, &state, &v, row);
+                self.outputs(model, (time, &state, &v), row);
                 return;
             }
             let state = if tau == 0.0 { arc.before } else { arc.after };
             let (q, _) = L::parts(state);
-            if !self.needs_velocity() {
-                self.outputs(time, state, &L::zero(q), row);
+            if !self.needs_velocity {
+                self.outputs(model, (time, state, &L::zero(q)), row);
                 return;
             }
             // The end of one element and the start of the next are the same node.
             let time = if tau == 0.0 { t } else { dense.end() };
-            let v = self.model.velocity(time, state, &L::zero(q));
+            let v = model.velocity(time, state, &L::zero(q));
             let v = v.unwrap_or_else(|| L::unknown(q));
-            self.outputs(time, state, &v, row);
+            self.outputs(model, (time, state, &v), row);
         };
-        let mut course = |function, part| self.course(dense, function, part);
+        let mut course = |function, part| self.course(run, dense, function, part);
         let (found, ends) = search::crossings(
             &self.seen.sides,
             samples,
@@ -302,14 +295,14 @@ where
                 remaining.take(root.function);
                 continue;
             }
-            let met = self.located(arc, &root, resolution);
+            let met = self.located(run, arc, &root, resolution);
             // If the run begins on a zero, the polynomial may first move to the wrong side, by less than its error.
             if met.time == arc.t && self.seen.sides[root.function] == 0.0 {
                 remaining.take(root.function);
                 continue;
             }
-            let (root, met) = self.earliest(arc, &remaining, (root, met), resolution);
-            if self.is_seen_again(arc, &root, met.time) {
+            let (root, met) = self.earliest(run, arc, &remaining, (root, met), resolution);
+            if self.is_seen_again(run.model(), arc, &root, met.time) {
                 remaining.take(root.function);
                 continue;
             }
@@ -319,10 +312,10 @@ where
                 remaining.take(crossed.function);
                 let at = (met.time, &met.state, &met.velocity);
                 let place = (met.length, met.inside.is_some());
-                let Some(Done { place, after }) = self.meet(crossed, at, place)? else {
+                let Some(Done { place, after }) = self.meet(run, crossed, at, place)? else {
                     continue;
                 };
-                self.leave((meeting, number), &met, after.as_ref());
+                self.leave(run, (meeting, number), &met, after.as_ref());
                 return Ok(Some(Cut {
                     t: met.time,
                     at: met.state,
@@ -339,10 +332,11 @@ where
     /// Applies the action at an event that ends an element of a given length; `None` if it was only recorded.
     fn meet(
         &mut self,
+        run: &mut dyn Searched<N, L>,
         Crossed { function, rises }: Crossed,
         (time, state, velocity): (f64, &L::State, &L::Vector),
         (length, inside): (f64, bool),
-    ) -> Result<Option<Done<'m, M, N, L>>, RunErrorKind> {
+    ) -> Result<Option<Done<N, L>>, RunErrorKind> {
         let Watched { on, value } = &self.watched[function];
         let (q, p) = L::parts(state);
         let event = Event {
@@ -353,9 +347,9 @@ where
             p: p.clone(),
             rises,
         };
-        let (act, impact) = act::act(&*self.model, (on, value), &event);
+        let (act, impact) = act::act(run.model(), (on, value), &event);
         let goes_by = act == Act::Record;
-        let after = act::after(&*self.model, self.remodel, &event, act);
+        let after = act::after(run, &event, act);
         let place = Place {
             watched: function,
             met: self.met.len(),
@@ -372,7 +366,7 @@ where
         self.cuts += 1;
         let is_it = |last: LastCut| last.function == function && self.is_soon(last.time, time);
         let returns = after.is_some() && self.seen.last.is_some_and(is_it);
-        let is_idle = |after: &After<'m, M, N, L>| after.model.is_none() && after.state == *state;
+        let is_idle = |after: &After<N, L>| after.set.is_none() && after.state == *state;
         let is_idle = after.as_ref().is_some_and(is_idle);
         let last = Some(LastCut {
             time,
@@ -389,16 +383,27 @@ where
     }
 
     /// Whether this is the last event, seen again because the polynomial starts with another velocity than the node.
-    fn is_seen_again(&self, arc: &Passage<'_, N, L>, root: &search::Root, time: f64) -> bool {
+    fn is_seen_again(
+        &self,
+        model: &dyn EventModel<N, L>,
+        arc: &Passage<'_, N, L>,
+        root: &search::Root,
+        time: f64,
+    ) -> bool {
         let last = self.last_of(root.into(), time);
-        last.is_some_and(|last| last.is_idle || self.begins_behind(arc, root))
+        last.is_some_and(|last| last.is_idle || self.begins_behind(model, arc, root))
     }
 
     /// Whether the root exists only because the polynomial starts before the zero, while the node is already beyond it.
-    fn begins_behind(&self, arc: &Passage<'_, N, L>, root: &search::Root) -> bool {
+    fn begins_behind(
+        &self,
+        model: &dyn EventModel<N, L>,
+        arc: &Passage<'_, N, L>,
+        root: &search::Root,
+    ) -> bool {
         let before = if root.rises { -1.0 } else { 1.0 };
         let value = |state: &L::State, time: f64, v: &L::Vector| {
-            before * self.row(time, state, v)[root.function]
+            before * self.row(model, (time, state, v))[root.function]
         };
         let inside = |part: f64| {
             let time = arc.t + part * root.tau * arc.h;
@@ -407,7 +412,7 @@ where
         };
         let (begin, middle) = (inside(0.0), inside(0.5));
         let guess = arc.dense.velocity_at_time(arc.t);
-        let Some(v) = self.model.velocity(arc.t, arc.before, &guess) else {
+        let Some(v) = model.velocity(arc.t, arc.before, &guess) else {
             return false;
         };
         begin > 0.0 && middle < begin && value(arc.before, arc.t, &v) < 0.5 * begin
@@ -422,7 +427,7 @@ where
     pub(super) fn severed<'c>(
         &'c self,
         origin: &Origin<'c, N, L>,
-        cut: &Cut<'m, M, N, L>,
+        cut: &Cut<N, L>,
     ) -> Severed<'c, 'm, N, L> {
         self.place(origin, &cut.place, cut.after.is_some())
     }
@@ -430,9 +435,9 @@ where
     /// The events of the last element that did not end it.
     pub(super) fn gone_by<'c>(
         &'c self,
-        origin: Origin<'c, N, L>,
+        origin: &'c Origin<'c, N, L>,
     ) -> impl Iterator<Item = Severed<'c, 'm, N, L>> {
-        (self.recorded.iter()).map(move |place| self.place(&origin, place, true))
+        (self.recorded.iter()).map(move |place| self.place(origin, place, true))
     }
 
     fn place<'c>(
@@ -459,19 +464,13 @@ where
         }
     }
 
-    /// Whether a watched function depends on the velocity. Functions of a Hamiltonian depend on the momentum instead.
-    fn needs_velocity(&self) -> bool {
-        M::NEEDS_VELOCITY || self.has_functions()
-    }
-
     fn has_functions(&self) -> bool {
-        let is_function = |one: &Watched<'m, N, L>| matches!(one.value, Value::Function(_));
-        self.watched.iter().any(is_function)
+        self.watched.iter().any(Watched::is_function)
     }
 
     /// The velocity inside an element; zero if no watched function needs it.
     fn velocity_inside(&self, dense: &L::Polynomial, time: f64, state: &L::State) -> L::Vector {
-        if self.needs_velocity() {
+        if self.needs_velocity {
             dense.velocity_at_time(time)
         } else {
             let (q, _) = L::parts(state);
@@ -479,22 +478,17 @@ where
         }
     }
 
-    /// Writes the values of the watched functions.
-    fn outputs(&self, t: f64, state: &L::State, v: &L::Vector, row: &mut Vec<f64>) {
-        self.outputs_of(&self.model, (t, state, v), row);
-    }
-
     /// The values of the watched functions.
-    fn row(&self, t: f64, state: &L::State, v: &L::Vector) -> Vec<f64> {
+    fn row(&self, model: &dyn EventModel<N, L>, place: (f64, &L::State, &L::Vector)) -> Vec<f64> {
         let mut row = Vec::with_capacity(self.watched.len());
-        self.outputs(t, state, v, &mut row);
+        self.outputs(model, place, &mut row);
         row
     }
 
-    /// The same for another model.
-    fn outputs_of(
+    /// Writes the values of the watched functions.
+    fn outputs(
         &self,
-        model: &M,
+        model: &dyn EventModel<N, L>,
         (t, state, v): (f64, &L::State, &L::Vector),
         row: &mut Vec<f64>,
     ) {
@@ -508,13 +502,13 @@ where
     }
 
     /// Whether bounds prove that no watched function vanishes in an element. Signs that were unknown are then known.
-    fn stays_off(&mut self, dense: &L::Polynomial) -> bool {
+    fn stays_off(&mut self, run: &dyn Searched<N, L>, dense: &L::Polynomial) -> bool {
         if self.has_functions() {
             return false;
         }
         for piece in dense.pieces() {
             let mut values = self.rooms.bounds.borrow_mut();
-            self.model.outputs_along(piece, &mut values);
+            run.outputs_along(piece, &mut values);
             for (watched, known) in self.watched.iter().zip(&mut self.seen.sides) {
                 let Value::Column(column) = watched.value else {
                     return false;
@@ -530,7 +524,13 @@ where
     }
 
     /// What bounds prove about a watched function in a part of an element.
-    fn course(&self, dense: &L::Polynomial, function: usize, part: (f64, f64)) -> Course {
+    fn course(
+        &self,
+        run: &dyn Searched<N, L>,
+        dense: &L::Polynomial,
+        function: usize,
+        part: (f64, f64),
+    ) -> Course {
         let Value::Column(column) = self.watched[function].value else {
             return Course::Unknown;
         };
@@ -547,7 +547,7 @@ where
             return Course::Bent;
         };
         let mut values = self.rooms.slopes.borrow_mut();
-        self.model.outputs_over(piece, within, &mut values);
+        run.outputs_over(piece, within, &mut values);
         let Dual { value, slope, .. } = values[column];
         if value.side() != 0.0 || slope.side() != 0.0 {
             Course::Plain

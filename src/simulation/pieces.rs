@@ -1,11 +1,11 @@
 //! Passes one element of the grid of a run; events may cut it into pieces.
 
-use super::acting;
-use super::events::act::After;
-use super::events::remodel::Changed;
-use super::events::{Cut, Events, Origin, Passage};
+mod searching;
+
+use super::events::Events;
+use super::events::remodel::Remodel;
 use super::follow::{Follow, Passed};
-use super::kind::Simulated;
+use super::kind::{Chosen, Simulated};
 use super::mesh::Mesh;
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
@@ -160,17 +160,69 @@ pub(super) type Search<'m, M, const N: usize, L> = fn(
 type Exchange<'m, M, const N: usize, L> =
     fn(&mut <L as Length<N>>::Stepper<'m, M>, Share<'m, M>) -> Result<(), RunErrorKind>;
 
-/// Solves elements and looks for events in them.
-pub(super) struct Pieces<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+/// What solves the elements of a run, and those that end at events.
+pub(super) struct Solver<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// The model with the parameters set by events so far.
-    pub(super) model: Share<'m, M>,
-    pub(super) events: Events<'m, M, N, L>,
-    /// `None` in a run without events.
-    search: Option<Search<'m, M, N, L>>,
-    /// The memory of a polynomial that was not kept.
-    spare: Option<L::Polynomial>,
+    model: Share<'m, M>,
+    /// Creates models with changed parameters, if an event can ask for it.
+    remodel: Option<Remodel<'m, M>>,
+    /// The model that an event has asked for, until the run continues with it.
+    next: Option<Share<'m, M>>,
     /// Known once events have set parameters.
     exchange: Option<Exchange<'m, M, N, L>>,
+    /// The element and the control of the steps that locate events; those of the run.
+    chosen: Chosen,
+    /// The stepper that locates events; separate from that of the run.
+    probe: Option<L::Stepper<'m, M>>,
+    /// The memory of a polynomial that was not kept.
+    spare: Option<L::Polynomial>,
+}
+
+/// Solves elements and looks for events in them.
+pub(super) struct Pieces<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+    solver: Solver<'m, M, N, L>,
+    pub(super) events: Events<'m, N, L>,
+    /// `None` in a run without events.
+    search: Option<Search<'m, M, N, L>>,
+}
+
+impl<'m, M, const N: usize, L> Solver<'m, M, N, L>
+where
+    M: Simulated<N, L>,
+    L: Length<N>,
+{
+    pub(super) fn new(
+        model: Share<'m, M>,
+        remodel: Option<Remodel<'m, M>>,
+        chosen: Chosen,
+    ) -> Self {
+        Self {
+            model,
+            remodel,
+            next: None,
+            exchange: None,
+            chosen,
+            probe: None,
+            spare: None,
+        }
+    }
+
+    /// Advances a state over a piece.
+    fn advance(
+        &self,
+        stepper: &mut L::Stepper<'m, M>,
+        piece: &Planned<'_, N>,
+        state: &mut L::State,
+    ) -> Result<(), RunErrorKind> {
+        let Planned { number, t, h, .. } = *piece;
+        M::advance(stepper, (piece.begin, h), state, piece.impulses)
+            .map_err(|source| self.model.failed(number, (t, h), source))
+    }
+
+    /// The polynomial of the piece that was solved last.
+    fn inside(&mut self, stepper: &mut L::Stepper<'m, M>, piece: &Planned<'_, N>) -> L::Polynomial {
+        M::inside(stepper, self.spare.take(), (piece.t, piece.next))
+    }
 }
 
 impl<'m, M, const N: usize, L> Pieces<'m, M, N, L>
@@ -179,17 +231,20 @@ where
     L: Length<N>,
 {
     pub(super) fn new(
-        model: Share<'m, M>,
-        events: Events<'m, M, N, L>,
+        solver: Solver<'m, M, N, L>,
+        events: Events<'m, N, L>,
         search: Option<Search<'m, M, N, L>>,
     ) -> Self {
         Self {
-            model,
+            solver,
             events,
             search,
-            spare: None,
-            exchange: None,
         }
+    }
+
+    /// The model with the parameters set by events so far.
+    pub(super) fn model(&self) -> &Share<'m, M> {
+        &self.solver.model
     }
 
     /// Gives a stepper the model of the start again, if events have set parameters.
@@ -198,7 +253,7 @@ where
         stepper: &mut L::Stepper<'m, M>,
         model: &Share<'m, M>,
     ) -> Result<(), RunErrorKind> {
-        match self.exchange {
+        match self.solver.exchange {
             Some(exchange) => exchange(stepper, model.clone()),
             None => Ok(()),
         }
@@ -231,10 +286,10 @@ where
         state: &mut L::State,
         observer: &mut dyn Observe<'m, M, N, L>,
     ) -> Result<(), RunErrorKind> {
-        self.advance(stepper, planned, state)?;
+        self.solver.advance(stepper, planned, state)?;
         // Before the transition matrix is computed, which uses the same memory.
         let dense = match observer.keeps() {
-            true => Some(self.inside(stepper, planned)),
+            true => Some(self.solver.inside(stepper, planned)),
             false => None,
         };
         Self::tell(stepper, planned, (before, state), observer)?;
@@ -242,23 +297,6 @@ where
             observer.inside(dense);
         }
         Ok(())
-    }
-
-    /// Advances a state over a piece.
-    fn advance(
-        &self,
-        stepper: &mut L::Stepper<'m, M>,
-        piece: &Planned<'_, N>,
-        state: &mut L::State,
-    ) -> Result<(), RunErrorKind> {
-        let Planned { number, t, h, .. } = *piece;
-        M::advance(stepper, (piece.begin, h), state, piece.impulses)
-            .map_err(|source| self.model.failed(number, (t, h), source))
-    }
-
-    /// The polynomial of the piece that was solved last.
-    fn inside(&mut self, stepper: &mut L::Stepper<'m, M>, piece: &Planned<'_, N>) -> L::Polynomial {
-        M::inside(stepper, self.spare.take(), (piece.t, piece.next))
     }
 
     /// Tells the observer of a piece that was not cut, with the states at its ends.
@@ -287,184 +325,6 @@ where
                 has_impulses: !piece.impulses.is_empty(),
             },
         );
-        Ok(())
-    }
-
-    /// Advances a state to the end of an element, or to the event that ends the run; looks for events.
-    pub(super) fn pass_searching(
-        &mut self,
-        stepper: &mut L::Stepper<'m, M>,
-        planned: Planned<'_, N>,
-        state: &mut L::State,
-        observer: &mut dyn Observe<'m, M, N, L>,
-    ) -> Result<Left, Box<Broken<N, L>>> {
-        let Planned { t, next, h, .. } = planned;
-        self.events.begin(h);
-        // The rest of the element behind its last event.
-        let (mut from, mut length) = (t, h);
-        // The number of impulses that have acted. Those at the start act here, so that events see their effect; except
-        // under constraints, which react to them inside the element.
-        let mut acted = match M::IS_CONSTRAINED {
-            true => 0,
-            false => self.model.kick_at(planned.impulses, (t, h), state),
-        };
-        loop {
-            if from != t {
-                acted = acted.max(acting::behind(planned.impulses, from, h));
-            }
-            let piece = Planned {
-                t: from,
-                h: length,
-                begin: if from == t { planned.begin } else { from },
-                impulses: &planned.impulses[acted..],
-                ..planned
-            };
-            let before = state.clone();
-            let is_due = self.events.has_due();
-            let cut = match is_due {
-                true => self.pass_due(piece, state, observer),
-                false => self.pass_piece(stepper, piece, state, observer),
-            };
-            let cut = match cut {
-                Ok(cut) => cut,
-                Err(kind) => return Err(Broken::in_piece(kind, (from, length), before)),
-            };
-            let Some(cut) = cut else {
-                if is_due && from != next {
-                    continue;
-                }
-                return Ok(left(observer.reached(stepper, next, state)));
-            };
-            let passed = cut.length_from(from, h);
-            let Cut {
-                t: time,
-                at,
-                inside,
-                after,
-                ..
-            } = cut;
-            if let Some(dense) = inside.filter(|_| observer.keeps()) {
-                observer.inside(dense);
-            }
-            let side = match after {
-                Some(_) => Side::Before,
-                None => Side::Last,
-            };
-            observer.at_event(stepper, &self.model, side, (time, &at));
-            observer.acted();
-            let Some(After {
-                state: mut after,
-                model,
-            }) = after
-            else {
-                *state = at;
-                return Ok(Left::Stopped);
-            };
-            let changed = model.map_or(Ok(()), |changed| self.change(stepper, observer, changed));
-            let good = changed.and_then(|()| self.model.check_restart(time, length, &after));
-            good.map_err(Broken::<N, L>::elsewhere)?;
-            if time == next {
-                // Impulses at the end of the run have no later piece to act in.
-                acted = acted.max(acting::behind(planned.impulses, next, h));
-                let ahead = &planned.impulses[acted..];
-                acted += self.model.kick_at(ahead, (next, h), &mut after);
-            }
-            observer.at_event(stepper, &self.model, Side::After, (time, &after));
-            *state = after;
-            if time != next {
-                length -= passed;
-            } else if !self.events.has_due() {
-                return Ok(left(observer.reached(stepper, next, state)));
-            }
-            from = time;
-        }
-    }
-
-    /// Meets the events that are due at the start of a piece, after another event has cut the element, up to the first
-    /// that ends a piece.
-    fn pass_due(
-        &mut self,
-        piece: Planned<'_, N>,
-        state: &L::State,
-        observer: &mut dyn Observe<'m, M, N, L>,
-    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
-        let cut = self.events.meet_due(piece.t, state)?;
-        let origin = || Origin::<N, L> {
-            t: piece.t,
-            begin: piece.t,
-            before: state,
-            impulses: &[],
-        };
-        for severed in self.events.gone_by(origin()) {
-            piece.followed(observer.met(&severed))?;
-        }
-        if let Some(cut) = &cut {
-            let severed = self.events.severed(&origin(), cut);
-            piece.followed(observer.cut(&severed))?;
-        }
-        Ok(cut)
-    }
-
-    /// Advances a state to the end of a piece, or to the event that cuts it.
-    fn pass_piece(
-        &mut self,
-        stepper: &mut L::Stepper<'m, M>,
-        piece: Planned<'_, N>,
-        state: &mut L::State,
-        observer: &mut dyn Observe<'m, M, N, L>,
-    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
-        let Planned { t, h, .. } = piece;
-        let before = state.clone();
-        self.advance(stepper, &piece, state)?;
-        let keeps = observer.keeps();
-        let looks = !self.events.stays_clear(stepper, (t, h));
-        // Before the transition matrix is computed, which uses the same memory.
-        let dense = match keeps || looks {
-            true => Some(self.inside(stepper, &piece)),
-            false => None,
-        };
-        if let Some(dense) = dense.as_ref().filter(|_| looks) {
-            let arc = Passage {
-                t,
-                begin: piece.begin,
-                h,
-                before: &before,
-                after: state,
-                dense,
-                impulses: piece.impulses,
-            };
-            let cut = self.events.pass(&arc)?;
-            for severed in self.events.gone_by(arc.origin()) {
-                piece.followed(observer.met(&severed))?;
-            }
-            if let Some(cut) = cut {
-                let severed = self.events.severed(&arc.origin(), &cut);
-                piece.followed(observer.cut(&severed))?;
-                return Ok(Some(cut));
-            }
-        }
-        Self::tell(stepper, &piece, (&before, state), observer)?;
-        match dense {
-            Some(dense) if keeps => observer.inside(dense),
-            Some(unneeded) => self.spare = Some(unneeded),
-            None => {}
-        }
-        Ok(None)
-    }
-
-    /// Continues with other parameters.
-    fn change(
-        &mut self,
-        stepper: &mut L::Stepper<'m, M>,
-        observer: &mut dyn Observe<'m, M, N, L>,
-        (model, values): Changed<'m, M>,
-    ) -> Result<(), RunErrorKind> {
-        observer.set(&model)?;
-        M::exchange(stepper, model.clone())?;
-        self.exchange = Some(M::exchange);
-        self.events.set_model(model.clone());
-        observer.changed(&model, &values);
-        self.model = model;
         Ok(())
     }
 }

@@ -4,7 +4,7 @@ use super::events::Events;
 use super::follow::Follower;
 use super::kind::{Chosen, Simulated};
 use super::mesh::Mesh;
-use super::pieces::{Broken, Left, Pieces, Planned, planned};
+use super::pieces::{Broken, Left, Pieces, Planned, Solver, planned};
 use super::progress;
 use super::recorder::Recorder;
 use super::setup::Simulation;
@@ -142,13 +142,13 @@ where
         for element in planned(mesh, done) {
             let Planned { number, t, h, .. } = element;
             let is_last = number + 1 == mesh.steps();
-            let is_kicked = pieces.model.kick(&self.impulses, (t, h), &mut state);
+            let is_kicked = pieces.model().kick(&self.impulses, (t, h), &mut state);
             let has_impulses = is_kicked || !element.impulses.is_empty();
-            recorder.begin(&*pieces.model, number, (t, h), &state, has_impulses);
+            recorder.begin(pieces.model(), number, (t, h), &state, has_impulses);
             let passed = self.model.guarded(|| {
                 let left = pieces.pass(stepper, element, &mut state, &mut recorder)?;
                 if left == Left::Done {
-                    let model = &*pieces.model;
+                    let model = pieces.model();
                     recorder.end(stepper, model, (number, is_last), (element.next, &state));
                 }
                 Ok(left)
@@ -160,7 +160,7 @@ where
                     break;
                 }
                 Err(broken) => {
-                    recorder.fail(stepper, &*pieces.model, number, &broken);
+                    recorder.fail(stepper, pieces.model(), number, &broken);
                     failure = Some(broken.kind);
                     break;
                 }
@@ -187,9 +187,9 @@ where
             control,
             ..self.chosen()
         };
-        let events = Events::new(self.model.clone(), &self.events, chosen)?;
-        let search = self.events.search();
-        Ok(Pieces::new(self.model.clone(), events, search))
+        let events = Events::new(&*self.model, &self.events)?;
+        let solver = Solver::new(self.model.clone(), self.events.remodel(), chosen);
+        Ok(Pieces::new(solver, events, self.events.search()))
     }
 
     /// Checks whether the run can begin at `start`.

@@ -112,7 +112,7 @@ where
             return course.failure().map(Err);
         };
         let (t, next) = leg.nodes;
-        pieces.model.kick(impulses, (t, leg.h), state);
+        pieces.model().kick(impulses, (t, leg.h), state);
         let impulses = M::acting(impulses, leg.nodes);
         let planned = Planned {
             number: leg.number,
@@ -192,7 +192,7 @@ where
     /// The model with the parameters set by events so far.
     pub(super) fn model(&self) -> &M {
         match &self.way.pieces {
-            Some(pieces) => &pieces.model,
+            Some(pieces) => pieces.model(),
             None => &self.way.model,
         }
     }
@@ -200,7 +200,7 @@ where
     /// The inputs of the model have other values from the next step on.
     pub(super) fn set_inputs(&mut self) {
         if let Some(pieces) = &mut self.way.pieces {
-            pieces.events.set_inputs();
+            pieces.events.forget_bounds();
         }
     }
 
@@ -304,7 +304,7 @@ where
                     model,
                     ..
                 } = &mut self.way;
-                let model = pieces.as_ref().map_or(&**model, |pieces| &*pieces.model);
+                let model = pieces.as_ref().map_or(&**model, |pieces| &**pieces.model());
                 if observer.last != next
                     && let Some(stepper) = course.stepper_mut()
                 {

@@ -1,14 +1,13 @@
 //! The actions at events, and the data of an event that the caller receives.
 
 use super::model::EventModel;
-use super::remodel::{Changed, Remodel};
+use super::searched::Searched;
 use super::settings::Settings;
 use super::value::{Function, Value};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 pub use crate::motion::Event;
 use crate::numbers::{larger, largest};
-use crate::simulation::kind::Simulated;
 use std::cell::Cell;
 use std::fmt;
 use std::ops::Deref;
@@ -314,38 +313,31 @@ pub(super) fn act<L: Length<N>, const N: usize>(
     (act, impact)
 }
 
-/// The state and the model with which a run continues after an event.
-pub(in crate::simulation) struct After<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+/// The state and the parameters with which a run continues after an event.
+pub(in crate::simulation) struct After<const N: usize, L: Length<N> = FixedLength> {
     pub(in crate::simulation) state: L::State,
-    /// The model with changed parameters, and these parameters by their indices; `None` if none was set.
-    pub(in crate::simulation) model: Option<Changed<'m, M>>,
+    /// The parameters that were set, by their indices; `None` if none was set.
+    pub(in crate::simulation) set: Option<Vec<(usize, f64)>>,
 }
 
-/// The state and the model after an action; `None` if the run ends.
-pub(super) fn after<'m, M, L, const N: usize>(
-    model: &M,
-    remodel: Option<Remodel<'m, M>>,
+/// What comes after an action; `None` if the run ends.
+pub(super) fn after<L: Length<N>, const N: usize>(
+    run: &mut dyn Searched<N, L>,
     event: &Event<N, L>,
     act: Act<N, L>,
-) -> Result<Option<After<'m, M, N, L>>, RunErrorKind>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+) -> Result<Option<After<N, L>>, RunErrorKind> {
     let state = match act {
         Act::Record | Act::Stop => return Ok(None),
         Act::Restart(state) => state,
-        Act::Impulse(impulse) => kicked(model, event.t, &event.state(), &impulse),
+        Act::Impulse(impulse) => kicked(run.model(), event.t, &event.state(), &impulse),
         Act::Set(settings) => {
-            let (model, values) = settings.applied(model, remodel)?;
-            let state = settings.state(&*model, event);
-            return Ok(Some(After {
-                state,
-                model: Some((model, values)),
-            }));
+            let values = settings.applied(run)?;
+            let state = settings.state(run.next_model(), event);
+            let set = Some(values);
+            return Ok(Some(After { state, set }));
         }
     };
-    Ok(Some(After { state, model: None }))
+    Ok(Some(After { state, set: None }))
 }
 
 /// The state after an impulse; constraints react to the part of it that violates them.

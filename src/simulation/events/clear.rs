@@ -67,15 +67,10 @@ impl Clear {
         *low <= t.min(t + h) && t.max(t + h) <= *high && within(rest)
     }
 
-    /// Tries to find a box around the step. `reach` writes the bounds of coordinates and velocities over the step,
-    /// `outputs` the signs of the watched functions over a box.
+    /// Begins the search for a box around the step, the bounds over which `reach` writes; false if it is not to be
+    /// looked for now.
     #[cold]
-    pub(super) fn look(
-        &mut self,
-        (t, h): (f64, f64),
-        reach: &mut Reach<'_>,
-        outputs: &mut Outputs<'_>,
-    ) -> bool {
+    pub(super) fn begin(&mut self, (t, h): (f64, f64), reach: &mut Reach<'_>) -> bool {
         self.bounds.clear();
         if self.wait > 0 {
             self.wait -= 1;
@@ -83,9 +78,13 @@ impl Clear {
         }
         self.reached.clear();
         self.reached.push((t.min(t + h), t.max(t + h)));
-        if !reach(&mut self.reached) {
-            return false;
-        }
+        reach(&mut self.reached)
+    }
+
+    /// Tries to find a box around the step whose search has begun; `outputs` writes the signs of the watched functions
+    /// over a box.
+    #[cold]
+    pub(super) fn look(&mut self, (_, h): (f64, f64), outputs: &mut Outputs<'_>) -> bool {
         while !self.try_growth(h, outputs) {
             if self.growth == 1.0 {
                 self.wait = Self::PATIENCE;

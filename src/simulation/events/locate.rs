@@ -1,10 +1,11 @@
 //! Locates an event: finds the length of the element that ends on it (T-122).
 
+use super::model::EventModel;
 use super::search::Root;
+use super::searched::Searched;
 use super::{Cut, Events, Passage};
 use crate::length::{Length, Polynomial};
 use crate::simulation::acting;
-use crate::simulation::kind::Simulated;
 
 /// A located event.
 pub(super) struct Met<const N: usize, L: Length<N>> {
@@ -24,7 +25,7 @@ pub(super) struct Met<const N: usize, L: Length<N>> {
 /// t.
 const DIGITS: f64 = 1e-12;
 
-impl<M, const N: usize, L: Length<N>> Cut<'_, M, N, L> {
+impl<const N: usize, L: Length<N>> Cut<N, L> {
     /// The distance from the start of the element that was cut: the difference of times, or the length where times have
     /// fewer digits than the step `h`.
     pub(in crate::simulation) fn length_from(&self, from: f64, h: f64) -> f64 {
@@ -37,20 +38,17 @@ impl<M, const N: usize, L: Length<N>> Cut<'_, M, N, L> {
     }
 }
 
-impl<'m, M, const N: usize, L> Events<'m, M, N, L>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+impl<const N: usize, L: Length<N>> Events<'_, N, L> {
     /// The event at a root of the polynomial: the end of an element that ends there, or, if no such element can be
     /// solved, the point of the polynomial.
     pub(super) fn located(
-        &mut self,
+        &self,
+        run: &mut dyn Searched<N, L>,
         arc: &Passage<'_, N, L>,
         root: &Root,
         resolution: f64,
     ) -> Met<N, L> {
-        if let Some(met) = self.locate(arc, root, resolution) {
+        if let Some(met) = self.locate(run, arc, root, resolution) {
             return met;
         }
         let Passage { t, h, dense, .. } = *arc;
@@ -60,8 +58,8 @@ where
         Met {
             length,
             time: arc.time(length, resolution),
-            values: self.row(t + length, &state, &velocity),
-            slopes: self.slopes(arc, length),
+            values: self.row(run.model(), (t + length, &state, &velocity)),
+            slopes: self.slopes(run.model(), arc, length),
             state,
             velocity,
             inside: None,
@@ -71,7 +69,8 @@ where
     /// Finds the length of the element whose end lies on the event, starting from the root of the polynomial; nodes are
     /// more accurate than the polynomial between them. `None` if such an element cannot be solved.
     pub(super) fn locate(
-        &mut self,
+        &self,
+        run: &mut dyn Searched<N, L>,
         arc: &Passage<'_, N, L>,
         root: &Root,
         resolution: f64,
@@ -86,26 +85,23 @@ where
         } = *arc;
         let enough = (0.25 * resolution).min(DIGITS * self.step.abs());
         let mut length = root.tau * h;
-        let mut probe = match self.probe.take() {
-            Some(probe) => probe,
-            None => M::stepper(self.model.clone(), self.chosen).ok()?,
-        };
         let mut last = f64::INFINITY;
         let mut passed = None;
         let mut met = None;
         for _ in 0..MAX_TRIALS {
             let time = arc.time(length, resolution);
-            let mut state = arc.before.clone();
-            let mut inside = None;
-            if length.abs() > resolution {
+            let (state, inside) = if length.abs() > resolution {
                 let impulses = &arc.impulses[..acting::behind(arc.impulses, time, h)];
-                M::advance(&mut probe, (begin, length), &mut state, impulses).ok()?;
-                inside = Some(M::inside(&mut probe, None, (t, time)));
-            }
+                let solved = run.solved((begin, length), arc.before, impulses, (t, time))?;
+                (solved.0, Some(solved.1))
+            } else {
+                (arc.before.clone(), None)
+            };
             let guess = dense.velocity_at_time(t + length);
-            let velocity = self.model.velocity(t + length, &state, &guess)?;
-            let values = self.row(t + length, &state, &velocity);
-            let slopes = self.slopes(arc, length);
+            let model = run.model();
+            let velocity = model.velocity(t + length, &state, &guess)?;
+            let values = self.row(model, (t + length, &state, &velocity));
+            let slopes = self.slopes(model, arc, length);
             let (value, along) = (values[root.function], slopes[root.function]);
             met = Some(Met {
                 length,
@@ -116,7 +112,7 @@ where
                 slopes,
                 inside,
             });
-            let slope = self.slope(arc, root, along, (length, value), passed);
+            let slope = self.slope(model, (arc, root), along, (length, value), passed);
             let change = -value / slope;
             let next = (length + change) * h.signum();
             let beyond = (-next).max(next - h.abs());
@@ -131,7 +127,6 @@ where
             passed = Some((length, value));
             length = next.clamp(0.0, h.abs()) * h.signum();
         }
-        self.probe = Some(probe);
         met
     }
 
@@ -140,8 +135,8 @@ where
     /// of elements of low order can.
     fn slope(
         &self,
-        arc: &Passage<'_, N, L>,
-        root: &Root,
+        model: &dyn EventModel<N, L>,
+        (arc, root): (&Passage<'_, N, L>, &Root),
         along: f64,
         (length, value): (f64, f64),
         passed: Option<(f64, f64)>,
@@ -156,8 +151,8 @@ where
         let chord = || {
             let at = |time: f64, state: &L::State| {
                 let guess = arc.dense.velocity_at_time(time);
-                let velocity = self.model.velocity(time, state, &guess)?;
-                Some(self.row(time, state, &velocity)[root.function])
+                let velocity = model.velocity(time, state, &guess)?;
+                Some(self.row(model, (time, state, &velocity))[root.function])
             };
             let ends = (at(arc.t, arc.before)?, at(arc.dense.end(), arc.after)?);
             Some((ends.1 - ends.0) / arc.h).filter(crosses)
@@ -166,7 +161,12 @@ where
     }
 
     /// The time derivatives of all watched functions on the polynomial.
-    fn slopes(&self, arc: &Passage<'_, N, L>, length: f64) -> Vec<f64> {
+    fn slopes(
+        &self,
+        model: &dyn EventModel<N, L>,
+        arc: &Passage<'_, N, L>,
+        length: f64,
+    ) -> Vec<f64> {
         const NEAR: f64 = 1e-4;
         let Passage { t, h, dense, .. } = *arc;
         let values = |length: f64| {
@@ -174,7 +174,7 @@ where
                 dense.at_time(t + length),
                 dense.velocity_at_time(t + length),
             );
-            self.row(t + length, &state, &v)
+            self.row(model, (t + length, &state, &v))
         };
         let (from, to) = (
             (length / h - NEAR).max(0.0) * h,

@@ -58,6 +58,8 @@ pub(in crate::simulation) trait EventModel<const N: usize, L: Length<N>> {
 
     /// Refuses a state that does not fit the model.
     fn check_start(&self, start: &L::State) -> Result<(), RunErrorKind>;
+
+    fn check_restart(&self, t: f64, h: f64, state: &L::State) -> Result<(), RunErrorKind>;
 }
 
 impl<M, const N: usize, L> EventModel<N, L> for M
@@ -136,5 +138,9 @@ where
 
     fn check_start(&self, start: &L::State) -> Result<(), RunErrorKind> {
         Simulated::check_start(self, start, &[])
+    }
+
+    fn check_restart(&self, t: f64, h: f64, state: &L::State) -> Result<(), RunErrorKind> {
+        Simulated::check_restart(self, t, h, state)
     }
 }

@@ -8,11 +8,11 @@ use super::act::After;
 use super::locate::Met;
 use super::remaining::{Crossed, Remaining};
 use super::search::Root;
+use super::searched::Searched;
 use super::{Cut, Events, Passage};
 use crate::error::RunErrorKind;
 use crate::length::Length;
 use crate::motion::LastCut;
-use crate::simulation::kind::Simulated;
 
 /// What the node at an event says about another watched function.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,11 +67,7 @@ const TOGETHER: f64 = 8.0;
 /// The same for two roots of one polynomial.
 const BESIDE: f64 = 16.0;
 
-impl<'m, M, const N: usize, L> Events<'m, M, N, L>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+impl<const N: usize, L: Length<N>> Events<'_, N, L> {
     /// Whether the direction of a zero crossing is one that its event watches.
     pub(super) fn counts(&self, Crossed { function, rises }: Crossed) -> bool {
         self.watched[function].on.crossing.counts(rises)
@@ -80,7 +76,8 @@ where
     /// The first event by nodes: the given one, or one whose function has already changed its sign at that node
     /// although its root on the polynomial comes later.
     pub(super) fn earliest(
-        &mut self,
+        &self,
+        run: &mut dyn Searched<N, L>,
         arc: &Passage<'_, N, L>,
         remaining: &Remaining,
         (mut root, mut met): (Root, Met<N, L>),
@@ -107,7 +104,7 @@ where
                 return (root, met);
             };
             is_tried[other.function] = true;
-            let found = self.locate(arc, &other, resolution);
+            let found = self.locate(run, arc, &other, resolution);
             if let Some(found) = found.filter(|found| found.length.abs() < met.length.abs()) {
                 (root, met) = (other, found);
             }
@@ -179,9 +176,10 @@ where
     /// Sets the events that are due at once after an element was cut, and the signs of the other functions.
     pub(super) fn leave(
         &mut self,
+        run: &dyn Searched<N, L>,
         (meeting, number): (Meeting, usize),
         met: &Met<N, L>,
-        after: Option<&After<'m, M, N, L>>,
+        after: Option<&After<N, L>>,
     ) {
         let Meeting {
             together,
@@ -199,7 +197,7 @@ where
             due.sort_by_key(|crossed| crossed.function);
         }
         self.seen.sides = sides;
-        self.carry_sides(&met.values, after, (met.time, &met.velocity));
+        self.carry_sides(run, &met.values, after, (met.time, &met.velocity));
     }
 
     /// Marks an event as recorded at the node from which the run continues, so that it is not met again if the next
@@ -261,11 +259,12 @@ where
     /// signs of the others are unknown until the next element; a change of sign by an action is no event.
     fn carry_sides(
         &mut self,
+        run: &dyn Searched<N, L>,
         values: &[f64],
-        after: Option<&After<'m, M, N, L>>,
+        after: Option<&After<N, L>>,
         (time, guess): (f64, &L::Vector),
     ) {
-        let now = after.and_then(|after| self.values_after(after, time, guess));
+        let now = after.and_then(|after| self.values_after(run, after, time, guess));
         let Some(now) = now else {
             self.seen.sides.fill(0.0);
             return;
@@ -282,47 +281,48 @@ where
     /// The values of all watched functions after an action, if the run can continue from there.
     fn values_after(
         &self,
-        after: &After<'m, M, N, L>,
+        run: &dyn Searched<N, L>,
+        after: &After<N, L>,
         time: f64,
         guess: &L::Vector,
     ) -> Option<Vec<f64>> {
-        let After { state, model } = after;
-        let model = match model {
-            Some((model, _)) => &**model,
-            None => &*self.model,
+        let After { state, set } = after;
+        let model = match set {
+            Some(_) => run.next_model(),
+            None => run.model(),
         };
         model.check_restart(time, self.step, state).ok()?;
-        let velocity = if self.needs_velocity() {
+        let velocity = if self.needs_velocity {
             model.velocity(time, state, guess)?
         } else {
             L::zero(guess)
         };
-        let mut row = Vec::with_capacity(self.watched.len());
-        self.outputs_of(model, (time, state, &velocity), &mut row);
-        Some(row)
+        Some(self.row(model, (time, state, &velocity)))
     }
 
     /// Meets the events that are due at the time of the last cut, in the state that it has left, up to the first that
     /// ends an element.
     pub(in crate::simulation) fn meet_due(
         &mut self,
+        run: &mut dyn Searched<N, L>,
         time: f64,
         state: &L::State,
-    ) -> Result<Option<Cut<'m, M, N, L>>, RunErrorKind> {
+    ) -> Result<Option<Cut<N, L>>, RunErrorKind> {
         self.recorded.clear();
         while let Some(crossed) = self.due.pop_front() {
             let (q, _) = L::parts(state);
-            let velocity = self.model.velocity(time, state, &L::zero(q));
+            let velocity = run.model().velocity(time, state, &L::zero(q));
             let velocity = velocity.unwrap_or_else(|| L::unknown(q));
-            let Some(done) = self.meet(crossed, (time, state, &velocity), (0.0, false))? else {
+            let Some(done) = self.meet(run, crossed, (time, state, &velocity), (0.0, false))?
+            else {
                 self.note_recorded(crossed, time);
                 continue;
             };
             if done.after.is_none() {
                 self.due.clear();
             }
-            let values = self.row(time, state, &velocity);
-            self.carry_sides(&values, done.after.as_ref(), (time, &velocity));
+            let values = self.row(run.model(), (time, state, &velocity));
+            self.carry_sides(run, &values, done.after.as_ref(), (time, &velocity));
             return Ok(Some(Cut {
                 t: time,
                 at: state.clone(),

@@ -4,9 +4,6 @@ use crate::length::Length;
 use crate::simulation::kind::Simulated;
 use tfe_runtime::Share;
 
-/// A model with changed parameters, and the changed parameters by their indices.
-pub(in crate::simulation) type Changed<'m, M> = (Share<'m, M>, Vec<(usize, f64)>);
-
 /// Creates a model with other values of some parameters, if its parameters can be set.
 pub(in crate::simulation) type Remodel<'m, M> = fn(&M, &[(usize, f64)]) -> Option<Share<'m, M>>;
 

@@ -1,11 +1,10 @@
 //! Values of parameters that events set.
 
 use super::model::EventModel;
-use super::remodel::{Changed, Remodel};
+use super::searched::Searched;
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::motion::Event;
-use crate::simulation::kind::Simulated;
 use tfe_runtime::CoordinateName;
 
 /// New values of parameters, for [`Act::Set`](crate::Act::Set). They hold until they are set again or the run ends;
@@ -91,17 +90,15 @@ impl<const N: usize, L: Length<N>> Settings<N, L> {
         &self.values
     }
 
-    /// The model with these values, and the indices of the parameters.
-    pub(super) fn applied<'m, M: Simulated<N, L>>(
+    /// Makes the model of a run with these values; returns them with the indices of their parameters.
+    pub(super) fn applied(
         &self,
-        model: &M,
-        remodel: Option<Remodel<'m, M>>,
-    ) -> Result<Changed<'m, M>, RunErrorKind> {
-        let values = self.numbered(&model.parameter_names())?;
-        let made = remodel.and_then(|remodel| remodel(model, &values));
-        match made {
-            Some(model) => Ok((model, values)),
-            None => Err(RunErrorKind::ParametersFixed),
+        run: &mut dyn Searched<N, L>,
+    ) -> Result<Vec<(usize, f64)>, RunErrorKind> {
+        let values = self.numbered(&run.model().parameter_names())?;
+        match run.remodel(&values) {
+            true => Ok(values),
+            false => Err(RunErrorKind::ParametersFixed),
         }
     }
 

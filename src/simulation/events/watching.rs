@@ -8,12 +8,12 @@ use super::{Events, Rooms, Watched};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::motion::Seen;
-use crate::simulation::kind::{Chosen, Simulated};
+use crate::simulation::kind::Simulated;
 use crate::simulation::pieces::{Pieces, Search};
 use std::collections::VecDeque;
 use std::fmt;
 use std::sync::Arc;
-use tfe_runtime::{CoordinateName, Share};
+use tfe_runtime::CoordinateName;
 
 /// The list of events of a run, with the function that searches for them.
 pub(crate) struct Watching<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
@@ -54,6 +54,10 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
 
     pub(in crate::simulation) fn search(&self) -> Option<Search<'m, M, N, L>> {
         self.search
+    }
+
+    pub(in crate::simulation) fn remodel(&self) -> Option<Remodel<'m, M>> {
+        self.remodel
     }
 
     /// Adds an event that sets no parameters.
@@ -147,33 +151,33 @@ impl<'m, M, const N: usize, L: Length<N>> Settable<'m, N, L> for M where
 {
 }
 
-impl<'m, M, const N: usize, L> Events<'m, M, N, L>
-where
-    M: Simulated<N, L>,
-    L: Length<N>,
-{
+impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
     /// Prepares the events of a run.
-    pub(in crate::simulation) fn new(
-        model: Share<'m, M>,
+    pub(in crate::simulation) fn new<M: Simulated<N, L>>(
+        model: &M,
         watching: &Watching<'m, M, N, L>,
-        chosen: Chosen,
     ) -> Result<Self, RunErrorKind> {
         let names = match watching.is_empty() {
             true => Vec::new(),
             false => model.output_names(),
         };
-        let watched = watched(&watching.on, &names)?;
-        let columns = names.len();
+        Self::of(&watching.on, &names, M::NEEDS_VELOCITY)
+    }
+
+    /// The events `on`, given the names of the outputs and whether these need the velocity.
+    fn of(
+        on: &[On<'m, N, L>],
+        names: &[CoordinateName],
+        needs_velocity: bool,
+    ) -> Result<Self, RunErrorKind> {
+        let watched = watched(on, names)?;
         Ok(Self {
-            model,
-            remodel: watching.remodel,
+            needs_velocity: needs_velocity || watched.iter().any(Watched::is_function),
             seen: unseen(&watched),
             due: VecDeque::new(),
             watched,
-            chosen,
             clear: Clear::default(),
-            rooms: Rooms::new(columns),
-            probe: None,
+            rooms: Rooms::new(names.len()),
             met: Vec::new(),
             recorded: Vec::new(),
             cuts: 0,
