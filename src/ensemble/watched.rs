@@ -13,6 +13,7 @@ use crate::motion::{Motion, Node};
 use crate::progress::Progress;
 use crate::simulation::{Act, Crossing, Occurrence, Settable, Simulated, Simulation};
 use std::ops::Range;
+use std::sync::Arc;
 use tfe_runtime::Statistics;
 
 impl<'m, M, const N: usize, K, L> Ensemble<'m, M, N, K, L>
@@ -50,7 +51,7 @@ where
         crossing: Crossing,
         act: impl Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm,
     ) -> Self {
-        self.events.push(name, crossing, None, act);
+        self.events.push(name.into(), crossing, None, Arc::new(act));
         self
     }
 }

@@ -15,13 +15,14 @@ use crate::constraints::tangent_basis;
 use crate::error::{RunError, RunErrorKind};
 use crate::motion::{Motion, Node};
 use crate::sensitivity::Sensitive;
+use crate::sensitivity::inside::Before;
 use crate::sensitivity::slopes::directions;
-use carried::{Along, AlongPiece, Carried, END, Reached, START};
+use carried::{Along, Carried, END, Reached, START};
 use jump::Jump;
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
-use tfe_runtime::step::{Control, DenseElement, Stepper};
+use tfe_runtime::step::{Control, Stepper};
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{
     ConstraintError, Direction, Element, InsideSlopes, Model, Share, State, StepError,
@@ -120,6 +121,28 @@ struct Across {
     more: DMatrix<f64>,
     /// Along the element, by its start and all directions, if asked for.
     inside: Vec<InsideSlopes>,
+}
+
+impl Across {
+    /// From the derivatives of the end, in rows: by the start, and in directions of which the last `more` are further
+    /// ones. `before` are the derivatives of the start.
+    fn of(
+        before: &Before,
+        entries: &[f64],
+        more: usize,
+        inside: Vec<InsideSlopes>,
+    ) -> Result<Self, TransitionError> {
+        let size = before.state.nrows();
+        let all = entries.len() / size;
+        let matrix = DMatrix::from_row_slice(size, all, entries);
+        let more = matrix.columns(all - more, more).into_owned();
+        let end = before.through(&matrix, None);
+        // A product over many elements can overflow although each factor is finite.
+        if !end.iter().all(|one| one.is_finite()) {
+            return Err(StepError::NonFinite.into());
+        }
+        Ok(Self { end, more, inside })
+    }
 }
 
 impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
@@ -236,14 +259,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             true => stepper.linearise_inside(&directions, &mut entries, &mut inside)?,
             false => stepper.linearise(&directions, &mut entries)?,
         }
-        let matrix = DMatrix::from_row_slice(2 * N, all, &entries);
-        let more = matrix.columns(all - more.len(), more.len()).into_owned();
-        let end = before.through(&matrix, None);
-        // A product over many elements can overflow although each factor is finite.
-        if !end.iter().all(|one| one.is_finite()) {
-            return Err(StepError::NonFinite.into());
-        }
-        Ok(Across { end, more, inside })
+        Across::of(before, &entries, more.len(), inside)
     }
 
     /// The derivatives along the last element of `stepper`.
@@ -254,18 +270,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         inside: Vec<InsideSlopes>,
     ) -> Along {
         let dense = stepper.dense(times.0, times.1);
-        let pieces = inside.into_iter().zip(dense.pieces());
-        let piece = |(slopes, piece): (InsideSlopes, &DenseElement<N>)| AlongPiece {
-            times: (piece.start(), piece.end()),
-            length: piece.length(),
-            slopes,
-            values: piece.coefficients().as_flattened().to_vec(),
-        };
-        Along {
-            times,
-            pieces: pieces.map(piece).collect(),
-            before: self.carried.before.clone(),
-        }
+        Along::of(&dense, times, inside, &self.carried.before)
     }
 
     /// The derivatives at an event that cuts an element, before its action, and those along the part of the element

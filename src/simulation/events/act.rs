@@ -226,7 +226,8 @@ impl<const N: usize, L: Length<N>> fmt::Debug for Occurrence<'_, N, L> {
     }
 }
 
-type Action<'m, const N: usize, L> =
+/// What is called at an event, without its type.
+pub(crate) type Action<'m, const N: usize, L> =
     Arc<dyn Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm>;
 
 /// An event to be watched: its function, its direction and its action.

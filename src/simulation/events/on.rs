@@ -65,7 +65,7 @@ where
         crossing: Crossing,
         act: impl Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm,
     ) -> Self {
-        self.events.push(name, crossing, None, act);
+        self.events.push(name.into(), crossing, None, Arc::new(act));
         self
     }
 
@@ -103,7 +103,8 @@ where
         act: impl Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm,
     ) -> Self {
         let function: Function<'m, L::Vector> = Arc::new(function);
-        self.events.push(name, crossing, Some(function), act);
+        self.events
+            .push(name.into(), crossing, Some(function), Arc::new(act));
         self
     }
 }

@@ -1,6 +1,6 @@
 //! The list of events that a run watches.
 
-use super::act::{Act, Crossing, Occurrence, On};
+use super::act::{Action, Crossing, On};
 use super::clear::Clear;
 use super::remodel::{Remodel, remodel};
 use super::value::{Function, Value};
@@ -12,7 +12,6 @@ use crate::simulation::kind::Simulated;
 use crate::simulation::pieces::{Pieces, Search};
 use std::collections::VecDeque;
 use std::fmt;
-use std::sync::Arc;
 use tfe_runtime::CoordinateName;
 
 /// The list of events of a run, with the function that searches for them.
@@ -81,18 +80,18 @@ impl<'m, M, const N: usize, L: Length<N>> Watching<'m, M, N, L> {
     /// Adds an event of an output or of a function.
     pub(crate) fn push(
         &mut self,
-        name: impl Into<String>,
+        name: String,
         crossing: Crossing,
         function: Option<Function<'m, L::Vector>>,
-        act: impl Fn(&Occurrence<'_, N, L>) -> Act<N, L> + Send + Sync + 'm,
+        act: Action<'m, N, L>,
     ) where
         M: Settable<'m, N, L>,
     {
         self.watch(On {
-            name: name.into(),
+            name,
             function,
             crossing,
-            act: Arc::new(act),
+            act,
         });
         self.remodel = Some(remodel);
     }

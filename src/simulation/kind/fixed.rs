@@ -184,7 +184,6 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         stepper.advance(t, h, state, impulses)
     }
 
-    #[inline(always)]
     fn reach(stepper: &mut Stepper<'_, M, N>, bounds: &mut Vec<(f64, f64)>) -> bool {
         let Some(reach) = stepper.reach() else {
             return false;
@@ -194,7 +193,6 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         true
     }
 
-    #[inline(always)]
     fn reaches_within(stepper: &mut Stepper<'_, M, N>, bounds: &[(f64, f64)]) -> bool {
         match (stepper.reach(), bounds.split_at_checked(N)) {
             (Some(reach), Some((q, z))) => lie_within(&reach.q, q) && lie_within(&reach.z, z),

@@ -11,6 +11,7 @@ use crate::sensitivity::{Sensitive, Slopes};
 use crate::simulation::events::Severed;
 use crate::simulation::events::value::output_slopes;
 use nalgebra::{DMatrix, RowDVector};
+use tfe_runtime::step::DenseElement;
 use tfe_runtime::transition::TransitionError;
 use tfe_runtime::{CoordinateName, Direction, InsideSlopes};
 
@@ -70,6 +71,29 @@ pub(in crate::simulation) struct AlongPiece {
     pub(in crate::simulation) slopes: InsideSlopes,
     /// The Legendre coefficients of dq/dτ, a row with a number for each coordinate, followed by those of dp/dτ.
     pub(in crate::simulation) values: Vec<f64>,
+}
+
+impl Along {
+    /// The derivatives along an element of a model of fixed size, solved between these times.
+    pub(super) fn of<const N: usize>(
+        dense: &DenseElement<N>,
+        times: (f64, f64),
+        inside: Vec<InsideSlopes>,
+        before: &Before,
+    ) -> Self {
+        let pieces = inside.into_iter().zip(dense.pieces());
+        let piece = |(slopes, piece): (InsideSlopes, &DenseElement<N>)| AlongPiece {
+            times: (piece.start(), piece.end()),
+            length: piece.length(),
+            slopes,
+            values: piece.coefficients().as_flattened().to_vec(),
+        };
+        Self {
+            times,
+            pieces: pieces.map(piece).collect(),
+            before: before.clone(),
+        }
+    }
 }
 
 impl Carried {
