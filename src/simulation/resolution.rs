@@ -168,7 +168,7 @@ where
 
     /// The warning of a run whose last state is `last`, if elements do not resolve the motion.
     pub(super) fn warning(&self, last: &L::State) -> Option<Warning> {
-        self.comparisons.found.warning(&L::numbers(last))
+        self.comparisons.found.warning(halves::<N, L>(last))
     }
 }
 
@@ -265,7 +265,7 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
             self.compare_from(beside.state, parts, examined, advance);
         }
         if is_due {
-            self.found.extend(&L::numbers(examined.before));
+            self.found.extend(halves::<N, L>(examined.before));
             let end = self.compare_from(examined.before.clone(), parts, examined, advance);
             let run = examined.after.clone();
             self.beside = end.map(|state| Beside { state, run });
@@ -282,8 +282,8 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
     ) -> Option<L::State> {
         let Examined { t, h, after, .. } = *examined;
         let end = self.end_of_parts((t, h), parts, start, advance);
-        let reached = end.as_ref().map(L::numbers);
-        let off = off(reached, L::numbers(after));
+        let reached = end.as_ref().map(halves::<N, L>);
+        let off = off(reached, halves::<N, L>(after));
         self.found.compared.push(Compared { t, h, off });
         end
     }
@@ -302,7 +302,7 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
             if !advance((start, part), &mut state) {
                 return None;
             }
-            self.found.extend(&L::numbers(&state));
+            self.found.extend(halves::<N, L>(&state));
         }
         Some(state)
     }
@@ -313,7 +313,7 @@ impl Found {
     const MOST: f64 = 0.03;
 
     /// Extends the bounds to include a state.
-    fn extend(&mut self, state: &[f64]) {
+    fn extend(&mut self, state: Halves<'_>) {
         match &mut self.bounds {
             Some(bounds) => bounds.include(state),
             None => self.bounds = Some(Bounds::of(state)),
@@ -321,7 +321,7 @@ impl Found {
     }
 
     /// The warning of a run whose last state is `last`, if elements do not resolve the motion.
-    fn warning(&self, last: &[f64]) -> Option<Warning> {
+    fn warning(&self, last: Halves<'_>) -> Option<Warning> {
         let mut bounds = self.bounds.clone()?;
         bounds.include(last);
         let extent = Extent::of(&bounds);
@@ -347,15 +347,25 @@ impl Found {
     }
 }
 
+/// The coordinates and the momenta of a state.
+type Halves<'a> = [&'a [f64]; 2];
+
+fn halves<const N: usize, L: Length<N>>(state: &L::State) -> Halves<'_> {
+    let (q, p) = L::parts(state);
+    [q.as_ref(), p.as_ref()]
+}
+
 /// The difference between the end of the shorter elements, if these reach one, and that of the element.
-fn off(end: Option<Vec<f64>>, mut after: Vec<f64>) -> Vec<f64> {
+fn off(end: Option<Halves<'_>>, after: Halves<'_>) -> Vec<f64> {
+    let mut off = after.concat();
     let Some(end) = end else {
-        return vec![f64::INFINITY; after.len()];
+        off.fill(f64::INFINITY);
+        return off;
     };
-    for (after, end) in after.iter_mut().zip(end) {
-        *after = end - *after;
+    for (off, end) in off.iter_mut().zip(end.into_iter().flatten()) {
+        *off = end - *off;
     }
-    after
+    off
 }
 
 /// The least and the largest coordinates and momenta so far.
@@ -366,16 +376,16 @@ struct Bounds {
 }
 
 impl Bounds {
-    fn of(state: &[f64]) -> Self {
+    fn of(state: Halves<'_>) -> Self {
         Self {
-            least: state.to_vec(),
-            largest: state.to_vec(),
+            least: state.concat(),
+            largest: state.concat(),
         }
     }
 
-    fn include(&mut self, state: &[f64]) {
+    fn include(&mut self, state: Halves<'_>) {
         let ends = self.least.iter_mut().zip(&mut self.largest);
-        for ((least, largest), number) in ends.zip(state) {
+        for ((least, largest), number) in ends.zip(state.into_iter().flatten()) {
             *least = least.min(*number);
             *largest = largest.max(*number);
         }

@@ -123,9 +123,10 @@ where
         return None;
     }
     let small = Small::beside(largest(sizes), noise);
+    let begins = Declarations::of::<M>().begins;
     let (mut weights, mut is_any, mut first) = ([1.0; N], false, 0);
     for end in 1..=N {
-        if end < N && M::coordinate_name(end).name == M::coordinate_name(first).name {
+        if end < N && !begins[end] {
             continue;
         }
         let weight = small.weight(largest(&sizes[first..end]));
