@@ -268,6 +268,18 @@ fn ignorable_coordinates() {
     compare_side_by_side(&Spherical {}, start);
 }
 
+/// Steppers of these models have no code for other mass matrices; `second_order` and `velocities_as_unknowns` step them.
+#[test]
+fn diagonal_mass_matrices_are_known_when_steppers_are_compiled() {
+    const {
+        assert!(<Drag as Model<2>>::DIAGONAL_MASS && <Charge as Model<2>>::DIAGONAL_MASS);
+        assert!(<Loose as Model<2>>::DIAGONAL_MASS);
+        // Coupled, dependent on the coordinates, and both.
+        assert!(!(<Coupled as Model<2>>::DIAGONAL_MASS || <Spherical as Model<2>>::DIAGONAL_MASS));
+        assert!(!(<Cart as Model<2>>::DIAGONAL_MASS || <Double as Model<2>>::DIAGONAL_MASS));
+    }
+}
+
 /// The results of a run must not depend on whether the inside of its elements is evaluated.
 #[test]
 fn the_inside_of_elements_costs_no_digit() {

@@ -46,6 +46,7 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
     }
 
     const IGNORABLE: [bool; N] = M::IGNORABLE;
+    const DIAGONAL_MASS: bool = M::DIAGONAL_MASS;
     const LANES: bool = M::LANES;
 
     #[inline(always)]

@@ -62,6 +62,7 @@ const _: () = {
             separable: true,
             smooth: true,
         };
+        const DIAGONAL_MASS: bool = true;
         /// L(q, v, t): 4 +−, 8 ×; those of a loop for one turn
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R {
             let () = Self::__TFE_LENGTHS;

@@ -44,6 +44,7 @@ const _: () = {
             separable: true,
             smooth: false,
         };
+        const DIAGONAL_MASS: bool = true;
         /// L(q, v, t): 4 +−, 10 ×, 1 sin/cos, 1 other
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let g = t.parameter(2, self.g);

@@ -36,6 +36,7 @@ const _: () = {
             separable: true,
             smooth: true,
         };
+        const DIAGONAL_MASS: bool = true;
         /// H(q, p, t): 5 +−, 7 ×, 1 ÷
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let lambda = t.parameter(0, self.lambda);

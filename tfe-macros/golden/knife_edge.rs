@@ -42,6 +42,7 @@ const _: () = {
             separable: true,
             smooth: true,
         };
+        const DIAGONAL_MASS: bool = true;
         /// L(q, v, t): 3 +−, 9 ×, 1 sin/cos
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 3], z: &[R; 3]) -> R {
             let alpha = t.parameter(3, self.alpha);

@@ -40,6 +40,7 @@ const _: () = {
             separable: true,
             smooth: true,
         };
+        const DIAGONAL_MASS: bool = true;
         /// L(q, v, t): 2 +−, 5 ×
         fn energy_function<R: __tfe::Real>(&self, t: R, q: &[R; 2], z: &[R; 2]) -> R {
             let g = t.parameter(2, self.g);

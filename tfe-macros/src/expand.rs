@@ -341,6 +341,7 @@ impl<'a> Kernels<'a> {
         };
         let facts = page::facts(self.derivation, &quote!(__tfe));
         let ignorable = page::ignorable(self.derivation, dof);
+        let diagonal_mass = page::diagonal_mass(self.derivation);
         let coordinate_name = self.coordinate_name();
         let (observable_names, observables) = self.observables();
         let names = (self.coordinates.as_slice(), &self.places);
@@ -406,6 +407,7 @@ impl<'a> Kernels<'a> {
                     const FORM: __tfe::Form = __tfe::Form::#form;
                     const FACTS: __tfe::Facts = #facts;
                     #ignorable
+                    #diagonal_mass
 
                     #check
 

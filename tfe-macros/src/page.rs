@@ -223,6 +223,18 @@ pub(crate) fn ignorable(derivation: &Derivation, dof: &TokenStream) -> Option<To
     (!ignorable.is_empty()).then(|| quote!(const IGNORABLE: [bool; #dof] = [#(#flags),*];))
 }
 
+/// The constant of `Model` that tells of a constant diagonal mass matrix of several coordinates; nothing if there is none.
+pub(crate) fn diagonal_mass(derivation: &Derivation) -> Option<TokenStream> {
+    let structure = derivation.structure();
+    let is_diagonal = structure.constant_mass && structure.diagonal_mass;
+    let is_told = is_diagonal && structure.dof.as_constant() != Some(1);
+    is_told.then(|| {
+        quote!(
+            const DIAGONAL_MASS: bool = true;
+        )
+    })
+}
+
 /// All operations, each counted once.
 pub(crate) fn total(counts: &Counts) -> usize {
     let all = operations(counts);

@@ -51,14 +51,6 @@ pub(crate) struct Increment {
     pub(crate) position: f64,
 }
 
-impl Increment {
-    /// An increment of zero.
-    pub(crate) const NONE: Self = Self {
-        relative: 0.0,
-        position: 0.0,
-    };
-}
-
 /// One element of a step: its start, its length, and the impulses in it.
 #[derive(Clone, Copy)]
 pub(crate) struct Span<'a, const N: usize> {

@@ -204,6 +204,10 @@ pub trait Model<const N: usize> {
     /// iteration of an element (T-162 of `docs/theory.md`). It is always correct to name none.
     const IGNORABLE: [bool; N] = [false; N];
 
+    /// Whether ∂²/∂z∂z is a diagonal matrix that is constant ([`Facts::constant_mass`]), whatever the parameters: nothing
+    /// is compiled that serves other mass matrices. It is always correct to say no; of one coordinate it is known.
+    const DIAGONAL_MASS: bool = false;
+
     /// L(q, v, t), or H(q, p, t).
     fn energy_function<R: Real>(&self, t: R, q: &[R; N], z: &[R; N]) -> R;
 

@@ -224,7 +224,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
             if is_second_order::<M, N>() {
                 // ν = v₀ + h M⁻¹ G f
                 let impulse = weighted(&scheme.force[row.clone()], &scheme.force_low[row], forces);
-                let change = self.inertia.times(0.0, &impulse);
+                let change = self.inertia.times::<M, _>(0.0, &impulse);
                 for a in 0..N {
                     rate[a] = self.velocity[a] + self.last_step * change[a];
                 }
@@ -293,7 +293,7 @@ impl<M: Model<N>, S: Storage, const N: usize> Apart for Velocities<'_, M, S, N> 
         let (rows, step) = (rates.as_chunks_mut::<N>().0, like.like(points.last_step));
         for (products, rows) in work.products.iter().zip(rows.chunks_mut(4)) {
             for a in 0..N {
-                let change = points.inertia.row(like, products, a);
+                let change = points.inertia.row::<M, _, 4>(like, products, a);
                 let velocity = (like.like(points.velocity[a]) + step * change).lanes();
                 for (row, velocity) in rows.iter_mut().zip(velocity) {
                     row[a] = velocity;

@@ -19,6 +19,14 @@ pub trait Precise: Real {
         (high, (self - (high - part)) + (other - part))
     }
 
+    /// The same if the magnitude of `self` is not below that of `smaller`; otherwise the error is not exact, but correct
+    /// to the working precision of `smaller`.
+    #[inline(always)]
+    fn exact_sum_with(self, smaller: Self) -> (Self, Self) {
+        let high = self + smaller;
+        (high, smaller - (high - self))
+    }
+
     /// The larger one; of a NaN and another number, the second.
     #[inline(always)]
     fn larger(self, other: Self) -> Self {

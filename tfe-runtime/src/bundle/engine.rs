@@ -118,7 +118,7 @@ impl<const N: usize> Engine<N> {
         self.last_step = h;
         // The slowest contraction of this step.
         statistics.contraction = Contraction::NONE;
-        self.inertia.set_step(Lanes([0.0; 4]), h);
+        self.inertia.set_step::<T::Kernels, _>(Lanes([0.0; 4]), h);
         let step = Step {
             model: models.kernels(),
             tables: &self.tables,

@@ -26,7 +26,7 @@ where
     ) {
         let momenta = load(like, &group.start.p);
         let missing = load(like, &group.low.p);
-        if self.inertia.is_diagonal() {
+        if self.inertia.is_diagonal::<M>() {
             for a in 0..N {
                 let inverse = like.like(self.inertia.inverse_diagonal[a]);
                 let p = (momenta[a], missing[a]);
@@ -34,8 +34,8 @@ where
                 (work.velocity[a], work.velocity_low[a]) = (v.lanes(), v_low.lanes());
             }
         } else {
-            let v = self.inertia.times(like, &momenta);
-            let low = self.inertia.times(like, &missing);
+            let v = self.inertia.times::<M, _>(like, &momenta);
+            let low = self.inertia.times::<M, _>(like, &missing);
             for a in 0..N {
                 (work.velocity[a], work.velocity_low[a]) = (v[a].lanes(), low[a].lanes());
             }
@@ -45,7 +45,7 @@ where
     /// M⁻¹ f at a point.
     #[inline(always)]
     fn accelerations<V: Eight>(&self, like: V, forces: &Row<N>) -> [V; N] {
-        self.inertia.times(like, &load(like, forces))
+        self.inertia.times::<M, _>(like, &load(like, forces))
     }
 
     /// One iteration for the forces, after their products with the tables.
@@ -98,7 +98,7 @@ where
         let h = like.like(self.h);
         let force = sum::<_, N, EXACT>(like, &self.tables.weights, &group.forces, a);
         let lever = &self.tables.lever;
-        let lever = if self.inertia.is_diagonal() {
+        let lever = if self.inertia.is_diagonal::<M>() {
             let (sum, low) = sum::<_, N, EXACT>(like, lever, &group.forces, a);
             let inverse = like.like(self.inertia.inverse_diagonal[a]);
             let inverse_low = like.like(self.inertia.inverse_low[a]);
@@ -120,7 +120,7 @@ where
     /// Computes the accelerations at the end of the iteration, where each depends on several forces.
     #[inline(always)]
     pub(super) fn prepare_end<V: Eight>(&self, like: V, group: &Group<N>, work: &mut Work<N>) {
-        if self.inertia.is_diagonal() {
+        if self.inertia.is_diagonal::<M>() {
             return;
         }
         for (acceleration, force) in work.velocities.iter_mut().zip(&group.forces) {

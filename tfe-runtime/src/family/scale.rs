@@ -3,7 +3,6 @@
 use super::space::{Leg, Problem, Sizes};
 use crate::equations::Increment;
 use crate::legendre::largest;
-use crate::points::sweep::relative;
 
 /// The sizes to which increments are compared.
 #[derive(Clone, Copy)]
@@ -30,5 +29,16 @@ impl Scale {
         // Either both are NaN or neither.
         let relative = velocity.max(position);
         Increment { relative, position }
+    }
+}
+
+/// |h δ| divided by the larger of |start| and |h x|; 0/0 is zero, and NaN stays NaN.
+#[inline(always)]
+fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
+    let scale = start.max(h.abs() * x);
+    if step == 0.0 {
+        0.0
+    } else {
+        h.abs() * step / scale
     }
 }

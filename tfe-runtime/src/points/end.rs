@@ -1,7 +1,7 @@
 //! The end of an element, in more than working precision where that is requested.
 
 use super::{Leg, Work};
-use crate::model::State;
+use crate::model::{Model, State};
 use crate::precise::Precise;
 use crate::registers::four::{Four, block, put};
 use crate::registers::storage::Storage;
@@ -38,24 +38,26 @@ impl<const N: usize, S: Storage> Work<N, S> {
 
     /// p₁ = p₀ + h Σ b f and q₁ = q₀ + h (v₀ + h M⁻¹ Σ (bᵀA) f) of second-order equations.
     #[inline(always)]
-    pub(super) fn finish_second_order<V: Four, const EXACT: bool>(
+    pub(super) fn finish_second_order<V: Four, M, const EXACT: bool>(
         &self,
         like: V,
         leg: &Leg<'_, N, S>,
         (end, end_low): (&mut State<N>, &mut State<N>),
-    ) {
+    ) where
+        M: Model<N>,
+    {
         let (tables, h) = (leg.tables, like.like(leg.h));
         if const { matches!(N, 1 | 2) } {
             // Σ (bᵀA) f beside Σ b f; the contributions of the latter to the velocities are not needed here.
             let force = (&tables.weights, &*self.forces);
             let sums = (tables.lever).sums_beside::<_, N, EXACT>(like, &self.forces, force);
             let mut lever = sums;
-            if !leg.inertia.is_diagonal() {
+            if !leg.inertia.is_diagonal::<M>() {
                 let (State { q, .. }, State { q: q_low, .. }) = apart(sums);
                 let (high, low) = leg.inertia.of_both(&q, &q_low);
                 lever = (block(like, &high, 0), block(like, &low, 0));
             }
-            let acceleration = self.accelerations::<_, EXACT>(like, leg, lever, 0);
+            let acceleration = self.accelerations::<_, M, EXACT>(like, leg, lever, 0);
             let v = (
                 block(like, &self.velocity, 0),
                 block(like, &self.velocity_low, 0),
@@ -75,12 +77,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
             put(sum, &mut lever, at);
             put(low, &mut lever_low, at);
         }
-        if !leg.inertia.is_diagonal() {
+        if !leg.inertia.is_diagonal::<M>() {
             (lever, lever_low) = leg.inertia.of_both(&lever, &lever_low);
         }
         for at in (0..N).step_by(4) {
             let lever = (block(like, &lever, at), block(like, &lever_low, at));
-            let acceleration = self.accelerations::<_, EXACT>(like, leg, lever, at);
+            let acceleration = self.accelerations::<_, M, EXACT>(like, leg, lever, at);
             let force = tables.weights.sums::<_, N, EXACT>(like, forces, at);
             let v = (
                 block(like, &self.velocity, at),
@@ -100,15 +102,18 @@ impl<const N: usize, S: Storage> Work<N, S> {
     /// Four accelerations from coordinate `at` on: forces already multiplied by an inverse mass matrix that is not
     /// diagonal, otherwise forces divided by masses.
     #[inline(always)]
-    fn accelerations<V: Four, const EXACT: bool>(
+    fn accelerations<V: Four, M, const EXACT: bool>(
         &self,
         like: V,
         leg: &Leg<'_, N, S>,
         forces: (V, V),
         at: usize,
-    ) -> (V, V) {
+    ) -> (V, V)
+    where
+        M: Model<N>,
+    {
         let inertia = leg.inertia;
-        if !inertia.is_diagonal() {
+        if !inertia.is_diagonal::<M>() {
             return forces;
         }
         let inverse = block(like, &inertia.inverse_diagonal, at);
@@ -185,5 +190,5 @@ fn moved_exactly<V: Precise>(h: V, rate: (V, V), start: (V, V)) -> (V, V) {
     let (product, rest) = h.product(rate.0);
     let rest = h.times_plus(rate.1, rest) + start.1;
     let (sum, lost) = start.0.exact_sum(product);
-    sum.exact_sum(lost + rest)
+    sum.exact_sum_with(lost + rest)
 }

@@ -208,7 +208,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
             let mut by_change = [zero; N];
             if const { M::FACTS.constant_mass } {
                 if !is_first {
-                    by_change = at.inertia().times(like, &changes);
+                    by_change = at.inertia().times::<M, _>(like, &changes);
                 }
             } else if !is_first {
                 for a in 0..N {
@@ -296,7 +296,7 @@ where
         step[a] = wanted - like.with(momenta[a]);
     }
     if const { M::FACTS.constant_mass } {
-        return at.inertia().times(like, &step);
+        return at.inertia().times::<M, _>(like, &step);
     }
     if let Some(mass) = mass {
         solve(like, mass, &mut step);

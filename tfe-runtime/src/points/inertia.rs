@@ -52,6 +52,9 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         if is_second_order::<M, N>() && first.z != [0.0; N] {
             return None;
         }
+        if const { is_always_diagonal::<M, N>() } {
+            return Self::of_diagonal(core::array::from_fn(|a| mass[a][a]), M::FORM);
+        }
         if let Some(diagonal) = diagonal_of(&mass) {
             return Self::of_diagonal(diagonal, M::FORM);
         }
@@ -105,15 +108,15 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
 
     /// Whether a constant mass matrix is diagonal; with one coordinate it always is.
     #[inline(always)]
-    pub(crate) fn is_diagonal(&self) -> bool {
-        N == 1 || self.has_diagonal_alone
+    pub(crate) fn is_diagonal<M: Model<N>>(&self) -> bool {
+        (const { is_always_diagonal::<M, N>() }) || self.has_diagonal_alone
     }
 
     /// The constant M⁻¹ (or H_pp) times a vector, in each lane.
     #[inline(always)]
-    pub(crate) fn times<V: Precise>(&self, like: V, vector: &[V; N]) -> [V; N] {
+    pub(crate) fn times<M: Model<N>, V: Precise>(&self, like: V, vector: &[V; N]) -> [V; N] {
         let mut product = [like.like(0.0); N];
-        if self.is_diagonal() {
+        if self.is_diagonal::<M>() {
             for a in 0..N {
                 product[a] = like.like(self.inverse_diagonal[a]) * vector[a];
             }
@@ -129,8 +132,8 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
 
     /// Computes h²/m for steps of length h.
     #[inline(always)]
-    pub(crate) fn set_step<V: Four>(&mut self, like: V, h: f64) {
-        if !self.is_diagonal() || self.step == h {
+    pub(crate) fn set_step<M: Model<N>, V: Four>(&mut self, like: V, h: f64) {
+        if !self.is_diagonal::<M>() || self.step == h {
             return;
         }
         self.step = h;
@@ -148,13 +151,13 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
 
     /// One row of M⁻¹ times a vector.
     #[inline(always)]
-    pub(crate) fn row<V: Side<L>, const L: usize>(
+    pub(crate) fn row<M: Model<N>, V: Side<L>, const L: usize>(
         &self,
         like: V,
         row: &[[f64; L]; N],
         a: usize,
     ) -> V {
-        if self.is_diagonal() {
+        if self.is_diagonal::<M>() {
             return like.like(self.inverse_diagonal[a]) * like.with(row[a]);
         }
         let mut sum = like.like(0.0);
@@ -180,6 +183,11 @@ impl<const N: usize, S: Storage> Inertia<N, S> {
         }
         (of_high, of_low)
     }
+}
+
+/// Whether the mass matrix is diagonal whatever the parameters: then what serves others is not compiled.
+pub(crate) const fn is_always_diagonal<M: Model<N>, const N: usize>() -> bool {
+    N == 1 || M::DIAGONAL_MASS
 }
 
 /// The diagonal of a matrix, if it is diagonal.

@@ -128,7 +128,7 @@ impl<const N: usize> Points<N, Heap> {
         }
         if is_second_order::<M, N>() {
             for a in 0..N {
-                let change = if self.inertia.is_diagonal() {
+                let change = if self.inertia.is_diagonal::<M>() {
                     self.inertia.inverse_diagonal[a].abs() * stages[a]
                 } else {
                     let row = self.inertia.inverse[a].iter().zip(&stages);

@@ -54,7 +54,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         M: Model<N>,
     {
         let (tables, inertia) = (at.tables(), at.inertia());
-        let is_diagonal = inertia.is_diagonal();
+        let is_diagonal = inertia.is_diagonal::<M>();
         let acting = &const { acting::<M, N>() };
         at.apply(
             like,
@@ -83,8 +83,8 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                     let more = like.with(products_low[c][a]);
                     like.like(inertia.reach[a]).times_plus(more, by_square)
                 } else {
-                    let rate_low = inertia.row(like, &products_low[c], a);
-                    let rate = inertia.row(like, &products[c], a);
+                    let rate_low = inertia.row::<M, _, L>(like, &products_low[c], a);
+                    let rate = inertia.row::<M, _, L>(like, &products[c], a);
                     square.times_plus(rate_low, square_low * rate)
                 };
                 let v = at.number(like, self.velocity[a]);
@@ -112,7 +112,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         M: Model<N>,
     {
         let inertia = at.inertia();
-        let is_diagonal = inertia.is_diagonal();
+        let is_diagonal = inertia.is_diagonal::<M>();
         if const { M::FACTS.forced } {
             let acting = &const { acting::<M, N>() };
             let once = &at.tables().once;
@@ -138,7 +138,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                 for a in 0..N {
                     z[a] = match M::FORM {
                         Form::Lagrangian => {
-                            let rate = inertia.row(like, &more_products[c], a);
+                            let rate = inertia.row::<M, _, L>(like, &more_products[c], a);
                             h.times_plus(rate, at.number(like, self.velocity[a]))
                         }
                         Form::Hamiltonian => {
@@ -195,7 +195,7 @@ fn positions<V, A, M, const DIAGONAL: bool, const L: usize, const N: usize>(
             like.like(inertia.reach[a])
                 .times_plus(like.with(products[a]), drift)
         } else {
-            square.times_plus(inertia.row(like, products, a), drift)
+            square.times_plus(inertia.row::<M, _, L>(like, products, a), drift)
         };
         q[a] = at.start(like, a).0 + moved;
     }

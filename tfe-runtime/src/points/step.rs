@@ -2,6 +2,7 @@
 
 use super::evaluation::{Evaluation, FEW, Placed};
 use super::forms::{acting, is_phase, is_second_order};
+use super::sweep::{LEAST, larger};
 use super::{Leg, Outcome, Points, Together, Work};
 use super::{is_finite, largest};
 use crate::error::StepError;
@@ -209,7 +210,7 @@ where
             work.rates.copy_from_slice(&points.rates);
         }
         if const { is_second_order::<M, N>() } {
-            points.inertia.set_step(like, self.place.1);
+            points.inertia.set_step::<M, _>(like, self.place.1);
         }
         let mut leg = Leg {
             t: self.place.0,
@@ -225,12 +226,12 @@ where
             },
             force_factors: [1.0; N],
         };
-        work.distance = largest(&leg.start.q);
+        work.distance = larger(LEAST, largest(&leg.start.q));
         if const { is_second_order::<M, N>() } {
-            work.begin_second_order(like, &leg);
-            work.speed = largest(&work.velocity);
+            work.begin_second_order::<_, M>(like, &leg);
+            work.speed = larger(LEAST, largest(&work.velocity));
         } else {
-            work.speed = largest(&leg.start.p);
+            work.speed = larger(LEAST, largest(&leg.start.p));
         }
         let is_rough = control.is_rough();
         let mut monitor = Monitor::of_fixed_point(control.tolerance);
@@ -312,9 +313,9 @@ where
             let place = (&mut end.0, &mut end.1);
             if const { is_second_order::<M, N>() } {
                 if is_rough {
-                    work.finish_second_order::<V, false>(like, &leg, place);
+                    work.finish_second_order::<V, M, false>(like, &leg, place);
                 } else {
-                    work.finish_second_order::<V, true>(like, &leg, place);
+                    work.finish_second_order::<V, M, true>(like, &leg, place);
                 }
             } else if is_rough {
                 work.finish::<V, false>(like, &leg, place);

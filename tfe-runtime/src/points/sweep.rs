@@ -103,15 +103,14 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a < b { b } else { a }
 }
 
-/// |h δ| divided by the larger of |start| and |h x|; 0/0 is zero, and NaN stays NaN.
+/// What sizes are at least, so that changes of zero are zero relative to them.
+pub(super) const LEAST: f64 = f64::MIN_POSITIVE;
+
+/// |h δ| divided by the larger of `start`, which is not zero, and |h x|.
 #[inline(always)]
-pub(crate) fn relative(h: f64, start: f64, x: f64, step: f64) -> f64 {
-    let scale = start.max(h.abs() * x);
-    if step == 0.0 {
-        0.0
-    } else {
-        h.abs() * step / scale
-    }
+fn beside(h: f64, start: f64, x: f64, change: f64) -> f64 {
+    let h = h.abs();
+    h * change / larger(start, h * x)
 }
 
 /// Four points of a trajectory.
@@ -257,9 +256,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
 
     /// Computes the velocity at the start, and its rounding error.
     #[inline(always)]
-    pub(super) fn begin_second_order<V: Four>(&mut self, like: V, leg: &Leg<'_, N, S>) {
+    pub(super) fn begin_second_order<V: Four, M>(&mut self, like: V, leg: &Leg<'_, N, S>)
+    where
+        M: Model<N>,
+    {
         let inertia = &leg.inertia;
-        if inertia.is_diagonal() {
+        if inertia.is_diagonal::<M>() {
             for at in (0..N).step_by(4) {
                 let p = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
                 let inverse = block(like, &inertia.inverse_diagonal, at);
@@ -304,9 +306,6 @@ impl<const N: usize, S: Storage> Work<N, S> {
     {
         let (changed, size) = self.accelerated().sweep(like, model, leg, at);
         let (changed, size) = Magnitude::of_both(changed, size);
-        if changed == 0.0 {
-            return Increment::NONE;
-        }
         let h = leg.h.abs();
         let speed = larger(self.speed, h * size);
         let distance = larger(self.distance, h * (self.speed + h * size));
@@ -332,10 +331,10 @@ impl<const N: usize, S: Storage> Work<N, S> {
     {
         let (changed, size) = (self.rows()).sweep_velocity(like, model, leg, at, refresh);
         let (changed, size) = Magnitude::of_both(changed, size);
-        let position = relative(leg.h, self.distance, size, changed);
+        let position = beside(leg.h, self.distance, size, changed);
         // The momentum at the end is as accurate as the velocities, whatever the step. The rest of an increment affects
         // it through the forces only, hence the factor.
-        let velocity = 0.25 * relative(1.0, 0.0, size, changed);
+        let velocity = 0.25 * beside(1.0, LEAST, size, changed);
         let relative = if velocity > position {
             velocity
         } else {
@@ -359,9 +358,9 @@ impl<const N: usize, S: Storage> Work<N, S> {
     {
         let [of_rates, of_forces] = self.rows().sweep_phase(like, model, leg, at, which);
         let (changed, size) = Magnitude::of_both(of_rates.0, of_rates.1);
-        let position = relative(leg.h, self.distance, size, changed);
+        let position = beside(leg.h, self.distance, size, changed);
         let (changed, size) = Magnitude::of_both(of_forces.0, of_forces.1);
-        let momentum = relative(leg.h, self.speed, size, changed);
+        let momentum = beside(leg.h, self.speed, size, changed);
         let relative = if (position + momentum).is_nan() {
             f64::NAN
         } else {

@@ -71,7 +71,8 @@ impl<S: Storage> Matrix<S> {
                         column * value
                     };
                 }
-                products[c][a] = (sums[0] + sums[1]).lanes();
+                let [even, odd] = sums;
+                products[c][a] = if paired == 0 { even } else { even + odd }.lanes();
             }
         }
     }
@@ -134,8 +135,11 @@ impl<S: Storage> Matrix<S> {
                     }
                 }
             }
+            let [even, odd] = sums;
             for c in 0..C {
-                products[c][a] = (sums[0][c] + sums[1][c]).lanes();
+                // Fewer than four columns are all in one sum.
+                let is_one = const { C == 1 } && whole.is_empty();
+                products[c][a] = if is_one { even[c] } else { even[c] + odd[c] }.lanes();
             }
         }
     }

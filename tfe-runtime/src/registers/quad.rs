@@ -61,7 +61,7 @@ impl Quad {
     /// Whether a mask has all lanes.
     #[inline(always)]
     fn has_all(self, mask: m64x4) -> bool {
-        self.isa.first_true_m64s(self.isa.not_m64x4(mask)) == 4
+        self.isa.avx._mm256_movemask_pd(pulp::cast(mask)) == 0b1111
     }
 
     /// Whether all lanes are within limits.
