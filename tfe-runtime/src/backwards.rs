@@ -5,8 +5,8 @@
 //! has to be set up and factored. With the adjoint seeds φ of the forces at the points of a collocated element,
 //!
 //! ```text
-//! φ_l = h b_l λ_p + h Σ_i A_il μ_i ,     F_l = (L_qq + Q_q)ᵀ φ_l − L_vqᵀ μ_l ,
-//! L_vv μ_j = h b_j λ_q + h Σ_l A_lj F_l + (L_qv + Q_v)ᵀ φ_j ;     λ_p += Σ μ_i ,     λ_q += Σ F_l .                  (T-150)
+//! φ_l = h b_l λ_p + h Σ_i A_il μ_i ,     Γ_l = (L_qq + Q_q)ᵀ φ_l − L_vqᵀ μ_l ,
+//! L_vv μ_j = h b_j λ_q + h Σ_l A_lj Γ_l + (L_qv + Q_v)ᵀ φ_j ;     λ_p += Σ μ_i ,     λ_q += Σ Γ_l .                  (T-150)
 //! ```
 
 use crate::condense::{Direction, add_multiple};
