@@ -346,14 +346,14 @@ impl fmt::Display for RunErrorKind {
                     f,
                     "the error is estimated at {estimate:.1e}, above the {asked:.1e} asked for"
                 )?;
-                match until {
-                    Some(time) => write!(f, "; it is met up to t = {}", Short(*time)),
-                    None => Ok(()),
+                if let Some(time) = until {
+                    write!(f, "; it is met up to t = {}", Short(*time))?;
                 }
+                f.write_str("; allow a larger error, or a shorter span")
             }
             Self::Span { start, end } => {
                 let (start, end) = (Short(*start), Short(*end));
-                write!(f, "the span {start}..{end} has an end that is not finite")
+                write!(f, "the span {start}..{end} has an end that is not finite; `steps` runs without an end")
             }
             Self::TooManySteps { span, step } => {
                 let (span, step) = (Short(*span), Short(*step));
@@ -411,7 +411,7 @@ impl fmt::Display for RunErrorKind {
             }
             Self::ParametersFixed => write!(
                 f,
-                "the parameters of this model cannot be changed: it has a field that cannot be copied, or kernels written by hand that do not implement it"
+                "the parameters of this model cannot be changed: it has a field that cannot be copied, or kernels written by hand that do not implement `with_parameter`"
             ),
             Self::SetUnsupported { call } => write!(
                 f,
@@ -429,7 +429,7 @@ impl fmt::Display for RunErrorKind {
             Self::Input(error) => error.fmt(f),
             Self::Ended { time } => {
                 let time = Short(*time);
-                write!(f, "a step after t = {time} failed: the run has ended")
+                write!(f, "a step after t = {time} failed: the run has ended; begin another one from the last node")
             }
             Self::KinksUnsupported { call } => write!(
                 f,
@@ -439,7 +439,7 @@ impl fmt::Display for RunErrorKind {
                 let time = Short(*time);
                 write!(
                     f,
-                    "node {node} at t = {time} does not lie beyond the one before it, in the direction of the run"
+                    "node {node} at t = {time} does not lie beyond the one before it, in the direction of the run: the times of nodes must be finite and in order"
                 )
             }
             Self::NodeEnds {
@@ -451,12 +451,12 @@ impl fmt::Display for RunErrorKind {
                 let [first, last, start, end] = [first, last, start, end].map(|time| Short(*time));
                 write!(
                     f,
-                    "the nodes go from {first} to {last}, but the span is {start}..{end}"
+                    "the nodes go from {first} to {last}, but the span is {start}..{end}: its ends must be the first and the last node"
                 )
             }
             Self::NodeEnds { start, end, .. } => {
                 let (start, end) = (Short(*start), Short(*end));
-                write!(f, "there are no nodes in the span {start}..{end}")
+                write!(f, "there are no nodes in the span {start}..{end}: give at least its two ends")
             }
             Self::Start { coordinate, q, p } => {
                 let (q, p) = (Short(*q), Short(*p));
@@ -479,7 +479,7 @@ impl fmt::Display for RunErrorKind {
                 let time = Short(*time);
                 write!(
                     f,
-                    "the impulse at t = {time} is not finite or lies outside the span"
+                    "the impulse at t = {time} is not finite or lies outside the span: move it into the span, or leave it out"
                 )
             }
             Self::Solve {

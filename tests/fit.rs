@@ -412,13 +412,15 @@ fn what_cannot_be_fitted_is_told() {
         }
     );
     let few = fit().parameters(["g", "c"]).output("height", [1.0], [0.5]);
-    assert!(matches!(
-        error(few),
+    let few = error(few);
+    assert_eq!(
+        few,
         FitError::TooFew {
             values: 1,
             unknowns: 2
         }
-    ));
+    );
+    assert!(few.to_string().contains("fit fewer parameters"), "{few}");
     let outside = with(fit().parameters(["c"]).bounds("c", 1.0..2.0));
     assert!(matches!(outside, Err(FitError::Bounds { value: 0.3, .. })));
     let stray = with(fit().parameters(["c"]).bounds("g", 1.0..2.0));

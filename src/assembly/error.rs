@@ -77,7 +77,7 @@ impl fmt::Display for AssemblyError {
             ),
             Self::Singular { iterations } => write!(
                 f,
-                "the assembled equations are singular after {iterations} iterations: there is no solution near the guess, or a whole family of them"
+                "the assembled equations are singular after {iterations} iterations: there is no solution near the guess, or a whole family of them; another guess, or another span or period, may help"
             ),
             Self::Stalled {
                 iterations,

@@ -514,19 +514,21 @@ impl fmt::Display for BoundaryError {
         match self {
             Self::Span { start, end } => write!(
                 f,
-                "the span {start} .. {end} has no length: give it with `.span(t0..t1)` or with the values at both ends"
+                "the span {start}..{end} is missing, empty or not finite: give it with `.span(t0..t1)` or with the values at both ends"
             ),
             Self::Count { needed, given } => {
                 write!(
                     f,
-                    "{given} conditions at the ends, {needed} are needed: two for each coordinate"
+                    "{given} conditions at the ends, {needed} are needed: two for each coordinate, with `.start(component, value)` and `.end(component, value)`"
                 )
             }
             Self::Component { component } => write!(
                 f,
-                "{component:?} does not exist: its index is not below the number of coordinates"
+                "{component:?} does not exist: its index, counted from 0, is not below the number of coordinates"
             ),
-            Self::Twice { component } => write!(f, "{component:?} is given twice at one end"),
+            Self::Twice { component } => {
+                write!(f, "{component:?} is given twice at one end: give it once")
+            }
             Self::Value { component, value } => write!(
                 f,
                 "{component:?} is given as {value}, but it must be finite"

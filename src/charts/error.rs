@@ -86,11 +86,14 @@ impl fmt::Display for ChartError {
             Self::TooManyCells { columns, rows } => {
                 write!(
                     f,
-                    "a map of {columns} × {rows} cells is too large for a picture"
+                    "a map of {columns} × {rows} cells is too large for a picture: use fewer cells"
                 )
             }
             Self::NotSvg { caption } => {
-                write!(f, "the figure “{caption}” is not an SVG picture")
+                write!(
+                    f,
+                    "the figure “{caption}” is not an SVG picture: it must be one `<svg>` element"
+                )
             }
             Self::Drawing { source } => write!(f, "the picture could not be drawn: {source}"),
         }

@@ -102,7 +102,7 @@ impl fmt::Display for ContinuationErrorKind {
                 )?;
                 match source {
                     Some(error) => error.fmt(f),
-                    None => f.write_str("the branch turns too sharply"),
+                    None => f.write_str("the branch turns too sharply; allow shorter steps with `.smallest_step(…)`"),
                 }
             }
         }

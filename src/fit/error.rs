@@ -92,7 +92,7 @@ impl fmt::Display for FitError {
             Self::NothingUnknown => {
                 f.write_str("nothing is unknown: name `.parameters([…])`, or leave out `.start(…)`")
             }
-            Self::NothingMeasured => f.write_str("there are no measured values"),
+            Self::NothingMeasured => f.write_str("there are no measured values: give some with `.output(name, &times, &values)`"),
             Self::NoParameter { name, known } => write!(
                 f,
                 "`{name}` is not a parameter of the model, or was named twice; parameters are `{}`",
@@ -118,22 +118,22 @@ impl fmt::Display for FitError {
                 } else {
                     write!(
                         f,
-                        "`{name}` begins with {value}, which is not between {low} and {high}"
+                        "`{name}` begins with {value}, which is not between {low} and {high}: change its value in the model, or the bounds"
                     )
                 }
             }
             Self::Early { time, start } => {
-                write!(f, "a value was measured at t = {time}, before the start at {start}")
+                write!(f, "a value was measured at t = {time}, before the start at {start}: give a start at or before the first time")
             }
             Self::StartOfConstraints => f.write_str(
                 "the start of a model with constraints must be known: give `.start(state, t0)`",
             ),
             Self::TooFew { values, unknowns } => {
-                write!(f, "{values} measured values cannot determine {unknowns} unknowns")
+                write!(f, "{values} measured values cannot determine {unknowns} unknowns: measure more, or fit fewer parameters")
             }
             Self::Run(kind) => write!(f, "the run with the first parameters failed: {kind}"),
             Self::NotFinite => f.write_str(
-                "an output or its derivative is not finite in the run with the first parameters",
+                "an output or its derivative is not finite in the run with the first parameters: begin with other values",
             ),
             Self::NotConverged {
                 deviation,
@@ -142,11 +142,11 @@ impl fmt::Display for FitError {
                 ..
             } => write!(
                 f,
-                "after {runs} runs the parameters were not found: {why}; the least deviation was {deviation:.3e}"
+                "after {runs} runs the parameters were not found: {why}; the least deviation was {deviation:.3e}; begin nearer to the solution, or with fewer parameters"
             ),
             Self::Undetermined { name } => write!(
                 f,
-                "the measured values do not determine all unknowns: `{name}` can be changed, alone or with others, without changing any of them"
+                "the measured values do not determine all unknowns: `{name}` can be changed, alone or with others, without changing any of them; measure another output, or leave it out of the fit"
             ),
         }
     }

@@ -194,7 +194,7 @@ impl<'r> Least<'r> {
                 why: match failure {
                     Some(FitError::Run(kind)) => format!("runs nearby fail, {kind}"),
                     Some(_) => "outputs nearby are not finite".to_owned(),
-                    None => format!("{reason:?}"),
+                    None => told(&reason),
                 },
             });
         };
@@ -238,6 +238,15 @@ impl<'r> Least<'r> {
             );
         }
         self.trials.push(Trial { values, deviation });
+    }
+}
+
+/// Why the method of Levenberg and Marquardt ended without a minimum, where no run failed nearby.
+fn told(reason: &TerminationReason) -> String {
+    match reason {
+        TerminationReason::LostPatience => "the largest number of runs is reached".to_owned(),
+        TerminationReason::Numerical(what) => format!("{what} is not finite"),
+        _ => "the last run failed".to_owned(),
     }
 }
 

@@ -52,7 +52,10 @@ impl fmt::Display for AtError {
                 "the element around t = {time} was not recorded; run without `record_every` for dense output"
             ),
             Self::NoOutput { output, known } if known.is_empty() => {
-                write!(f, "there is no output `{output}`: the model declares none")
+                write!(
+                    f,
+                    "there is no output `{output}`: the model declares none; add `output({output}) = …` to its `#[dynamics(...)]`"
+                )
             }
             Self::NoOutput { output, known } => write!(
                 f,

@@ -173,7 +173,7 @@ impl fmt::Display for OptimalControlErrorKind {
         match self {
             Self::Ends(error) => error.fmt(f),
             Self::Backwards => {
-                f.write_str("the span goes backwards: costs are counted forwards in time")
+                f.write_str("the span goes backwards: costs are counted forwards in time, so that it must end after its start")
             }
             Self::Model(error) => error.fmt(f),
             Self::Element(error) => error.fmt(f),
@@ -185,7 +185,7 @@ impl fmt::Display for OptimalControlErrorKind {
                 "no cost was given: name an output with `.running_cost(…)` or `.end_cost(…)`",
             ),
             Self::UnknownOutput { name, known } if known.is_empty() => {
-                write!(f, "the model has no output `{name}`: it declares none")
+                write!(f, "the model has no output `{name}`: it declares none; add `output({name}) = …` to its `#[dynamics(...)]`")
             }
             Self::UnknownOutput { name, known } => write!(
                 f,

@@ -116,23 +116,23 @@ impl fmt::Display for OrbitError {
             Self::Mesh(error) => error.fmt(f),
             Self::Unsupported { call, of } => write!(f, "`{call}` is not supported for {of}"),
             Self::Phase { index } => {
-                write!(f, "the phase condition names coordinate {index}, which does not exist")
+                write!(f, "the phase condition names coordinate {index}, which does not exist: indices begin with 0")
             }
             Self::Guess(error) => write!(f, "the run for the first guess failed: {error}"),
             Self::Run(error) => write!(f, "a run in the search for the orbit failed: {error}"),
             Self::Stopped { time } => {
-                write!(f, "an event ends the motion at t = {time}, before a period has passed")
+                write!(f, "an event ends the motion at t = {time}, before a period has passed: let it go on there, for example with `Act::Restart`")
             }
             Self::ParameterLeft { parameter, value } => write!(
                 f,
-                "events leave `{parameter}` at {value} after a period, which is not its value at the start"
+                "events leave `{parameter}` at {value} after a period, which is not its value at the start: let an event of the period set it back"
             ),
             Self::Stalled {
                 residual,
                 iterations,
             } => write!(
                 f,
-                "no orbit near the guess: after {iterations} corrections the end of the motion differs from its start by {residual:.1e} of the motion"
+                "no orbit near the guess: after {iterations} corrections the end of the motion differs from its start by {residual:.1e} of the motion; begin nearer to the orbit, or take more elements"
             ),
             Self::AtRest => f.write_str(
                 "the search for an orbit ends at an equilibrium, which repeats after any time: begin from a moving state nearer to the orbit \

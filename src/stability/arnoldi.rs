@@ -55,7 +55,7 @@ impl fmt::Display for DominantError {
             Self::NotConverged { best, tolerance } => write!(
                 f,
                 "no eigenvalue of largest modulus after {} products: the best has modulus {} with the residual {:.1e}, {tolerance:.1e} of it was asked for; \
-                 many eigenvalues of nearly the same modulus separate slowly or never",
+                 many eigenvalues of nearly the same modulus separate slowly or never; allow more `products`, or more `vectors`",
                 best.products,
                 best.radius(),
                 best.residual

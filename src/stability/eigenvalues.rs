@@ -33,7 +33,10 @@ impl fmt::Display for EigenvalueError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotSquare { rows, columns } => {
-                write!(f, "a matrix of {rows} × {columns} has no eigenvalues")
+                write!(
+                    f,
+                    "a matrix of {rows} × {columns} has no eigenvalues: it must be square"
+                )
             }
             Self::NotFinite { row, column } => {
                 write!(

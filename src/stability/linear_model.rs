@@ -38,7 +38,7 @@ impl fmt::Display for LinearModelError {
             Self::NoVelocity => {
                 "no velocity belongs to the momentum of the state: is the mass matrix singular there?"
             }
-            Self::NotFinite => "a second derivative of the model is not finite at the state",
+            Self::NotFinite => "a second derivative of the model is not finite at the state: is it a singular point of the model?",
             Self::Model(error) => return error.fmt(f),
         })
     }

@@ -78,7 +78,10 @@ impl fmt::Display for WorkPrecisionError {
                 write!(f, "a step is {step}, but it must be finite and not zero")
             }
             Self::TooManySteps { span, step } => {
-                write!(f, "a span of {span} holds too many steps of {step}")
+                write!(
+                    f,
+                    "a span of {span} holds too many steps of {step}: choose longer steps, or a shorter span"
+                )
             }
             Self::Start(kind) => kind.fmt(f),
             Self::ReferenceRun(kind) => write!(
@@ -151,7 +154,7 @@ impl fmt::Display for SaveError {
             ),
             Self::NoCharts { path } => write!(
                 f,
-                "{} would be a picture, and this program was built without the feature `charts`",
+                "{} would be a picture, and this program was built without the feature `charts`: enable it, or save numbers as `.csv`",
                 path.display()
             ),
             #[cfg(feature = "charts")]

@@ -132,6 +132,22 @@ fn orbits_that_do_not_exist() {
     ] {
         assert!(error.to_string().len() > 20);
     }
+    let stalled = OrbitError::Stalled {
+        residual: 0.1,
+        iterations: 50,
+    };
+    for (error, remedy) in [
+        (OrbitError::Phase { index: 3 }, "indices begin with 0"),
+        (OrbitError::Stopped { time: 0.5 }, "`Act::Restart`"),
+        (stalled, "begin nearer to the orbit"),
+        (
+            AssemblyError::Singular { iterations: 7 }.into(),
+            "another guess",
+        ),
+    ] {
+        let told = error.to_string();
+        assert!(told.contains(remedy), "{told}");
+    }
 }
 
 /// If an orbit is found it is the limit cycle, whose amplitude is 2. The equilibrium must not be returned, whether the
@@ -226,6 +242,16 @@ fn boundary_values_that_are_ill_posed() {
     assert!(matches!(problem().solve(), Err(BoundaryError::Span { .. })));
     let error = problem().from_to([0.0; 2], [1.0; 2], 1.0..1.0).solve();
     assert!(matches!(error, Err(BoundaryError::Span { .. })));
+    // An infinite span has a length: the message does not say otherwise.
+    let error = problem()
+        .from_to([0.0; 2], [1.0; 2], 0.0..f64::INFINITY)
+        .solve();
+    let told = error.err().map(|error| error.to_string());
+    let told = told.unwrap_or_default();
+    assert!(
+        told.contains("0..inf is missing, empty or not finite"),
+        "{told}"
+    );
     let error = problem()
         .span(0.0..1.0)
         .start(Component::Coordinate(0), 0.0)

@@ -3,6 +3,7 @@
 use crate::common::{assert_close, larger, observed_order};
 use crate::models::{DoublePendulum, Pendulum};
 use tfe::prelude::*;
+use tfe::runtime::ConstraintError;
 use tfe::{AtError, RunErrorKind, StepError};
 
 #[test]
@@ -441,6 +442,43 @@ fn a_run_that_fails_says_where_and_keeps_the_motion() {
             .all(|node| node.q[0].is_finite() && node.p[0].is_finite())
     );
     assert!(error.to_string().contains("t ="), "{error}");
+}
+
+/// Errors whose remedy does not follow from what happened name it.
+#[test]
+fn messages_of_runs_say_what_to_do() {
+    let missed = |until| RunErrorKind::AccuracyMissed {
+        asked: 1e-10,
+        estimate: 3e-9,
+        until,
+    };
+    let nowhere = RunErrorKind::NodeEnds {
+        first: Some(0.0),
+        last: Some(2.0),
+        start: 0.0,
+        end: 3.0,
+    };
+    let endless = RunErrorKind::Span {
+        start: 0.0,
+        end: f64::INFINITY,
+    };
+    for (told, remedy) in [
+        (missed(Some(2.0)).to_string(), "; allow a larger error"),
+        (missed(None).to_string(), "; allow a larger error"),
+        (nowhere.to_string(), "must be the first and the last node"),
+        (endless.to_string(), "`steps` runs without an end"),
+        (StepError::NonFinite.to_string(), "a singular point"),
+        (
+            StepError::SingularTangent { unknown: 3 }.to_string(),
+            "without kinetic energy",
+        ),
+        (
+            StepError::Constraint(ConstraintError::NeedsNewton).to_string(),
+            "`Solve::Auto`",
+        ),
+    ] {
+        assert!(told.contains(remedy), "{told}");
+    }
 }
 
 #[test]

@@ -194,7 +194,7 @@ impl fmt::Display for ModelError {
             ),
             Self::SingularMass { coordinate } => write!(
                 f,
-                "the kinetic energy does not depend on the velocity of coordinate {coordinate}"
+                "the kinetic energy does not depend on the velocity of coordinate {coordinate}: give it a mass, or leave the coordinate out"
             ),
             Self::NoVelocity => f.write_str(
                 "no velocity belongs to the momentum: is the mass matrix singular there?",
@@ -208,15 +208,15 @@ impl fmt::Display for ModelError {
                 "`{element}` is not supported for this model of run-time length: use `Mixed`; with the feature `sparse`, Lagrangians without constraints support every element"
             ),
             Self::NoNewton => f.write_str(
-                "Newton's method for models of run-time length needs the feature `sparse`",
+                "Newton's method for models of run-time length needs the feature `sparse`: enable it, or use `Solve::Auto`",
             ),
             Self::NeedsNewton => f.write_str(
-                "constraints, and kinetic energies other than ½ Σ m v², need Newton's method: the fixed-point iteration does not support them",
+                "constraints, and kinetic energies other than ½ Σ m v², need Newton's method, which the fixed-point iteration cannot replace: use `Solve::Auto` or `Solve::Newton`",
             ),
             Self::ConstraintsNotSupported => f.write_str(
                 "constraints of models of run-time length need the feature `sparse` and a Lagrangian",
             ),
-            Self::TooLarge => f.write_str("the equations do not fit into memory"),
+            Self::TooLarge => f.write_str("the equations do not fit into memory: use a smaller model, or an element with fewer nodes"),
         }
     }
 }

@@ -5,6 +5,9 @@ use crate::element::{Element, ElementError};
 use crate::model::CoordinateName;
 use core::fmt;
 
+/// The message of values that are not finite, of a step and of a Legendre transform.
+const NOT_FINITE: &str = "a value of the model or of the state is not finite: look for a singular point of the model, such as a division by zero or the root of a negative number, or take a shorter step";
+
 /// Why the Legendre transform at a point, from velocity to momentum or back, failed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -30,16 +33,17 @@ impl fmt::Display for LegendreError {
         match self {
             Self::Singular { coordinate } => write!(
                 f,
-                "the matrix of second derivatives with respect to the velocities (momenta) is singular at coordinate {coordinate}"
+                "the matrix of second derivatives with respect to the velocities (momenta) is singular at coordinate {coordinate}: look for a coordinate without kinetic energy or a singular point of the model; \
+                 a Hamiltonian that is linear in a momentum needs an element without velocities, such as `Mixed`"
             ),
             Self::Stalled {
                 iterations,
                 residual,
             } => write!(
                 f,
-                "the velocity (momentum) was not found in {iterations} iterations: the residual is still {residual:.1e}"
+                "the velocity (momentum) was not found in {iterations} iterations: the residual is still {residual:.1e}; there may be none: take a shorter step, or begin elsewhere"
             ),
-            Self::NonFinite => f.write_str("a value of the model or of the state is not finite"),
+            Self::NonFinite => f.write_str(NOT_FINITE),
         }
     }
 }
@@ -121,16 +125,16 @@ impl fmt::Display for ConstraintError {
                 "the constraints are dependent, and `{constraint}`, which should follow from the others, is off by {residual:.1e}: the constraints contradict each other, or the position is singular"
             ),
             Self::NeedsNewton => f.write_str(
-                "models with constraints need Newton's method: the fixed-point iteration does not support them",
+                "models with constraints need Newton's method, which the fixed-point iteration cannot replace: use `Solve::Auto` or `Solve::Newton`",
             ),
             Self::SingularMass => {
-                f.write_str("the mass matrix is singular for motions that the constraints allow")
+                f.write_str("the mass matrix is singular for motions that the constraints allow: give every coordinate a mass, or constrain those without")
             }
             Self::DependentRows => f.write_str(
                 "the constraints are dependent, which models of run-time length do not support: remove constraints that follow from others (or the mass matrix is singular for motions that they allow)",
             ),
             Self::RankChanged => {
-                f.write_str("the number of independent constraints changes along the motion")
+                f.write_str("the number of independent constraints changes along the motion: it passes a singular position, across which there are no derivatives on the constraints")
             }
             Self::Parameter => f.write_str(
                 "the model has no derivative with respect to this parameter: it is not in the list of its parameters",
@@ -237,12 +241,12 @@ impl fmt::Display for StepError {
                     "the workspace has {given} numbers, but the element needs {needed}"
                 )
             }
-            Self::NonFinite => f.write_str("a value of the model or of the state is not finite"),
+            Self::NonFinite => f.write_str(NOT_FINITE),
             Self::Inconsistent => f.write_str(
                 "an index or the length of a vector does not fit the model: its `check` says which",
             ),
             Self::SingularTangent { unknown } => {
-                write!(f, "the tangent matrix is singular at unknown {unknown}")
+                write!(f, "the tangent matrix is singular at unknown {unknown}, so that the element does not determine the motion: look for a coordinate without kinetic energy, or take a shorter step")
             }
             Self::NewtonStalled {
                 iterations,
@@ -345,7 +349,7 @@ impl fmt::Display for TransitionError {
         match self {
             Self::Element(error) => error.fmt(f),
             Self::Step(error) => error.fmt(f),
-            Self::NoStep => f.write_str("no step has been taken"),
+            Self::NoStep => f.write_str("no step has been taken: make one first"),
             Self::MovedImpulse { time } => write!(
                 f,
                 "the impulse at t = {time} acts inside an element that an event cuts: end an element there with `break_at({time})`"

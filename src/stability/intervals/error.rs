@@ -54,7 +54,10 @@ impl<E: fmt::Display> fmt::Display for IntervalError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Range { start, end } => {
-                write!(f, "the range {start}..{end} is empty or not finite")
+                write!(
+                    f,
+                    "the range {start}..{end} is empty or not finite: give two finite ends, in ascending order"
+                )
             }
             Self::Matrix { at, source } => write!(f, "no transition matrix at {at}: {source}"),
             Self::Shape { at, rows, columns } => {
@@ -72,7 +75,7 @@ impl<E: fmt::Display> fmt::Display for IntervalError<E> {
             Self::Unresolved { near, evaluations } => {
                 write!(
                     f,
-                    "the matrix is not smooth near {near}: unresolved after {evaluations} evaluations"
+                    "the matrix is not smooth near {near}: unresolved after {evaluations} evaluations; leave that place out of the range"
                 )
             }
         }

@@ -207,7 +207,7 @@ impl fmt::Display for FloquetError {
             Self::Transition { element, source } => write!(f, "element {element}: {source}"),
             Self::NotAtRest { element, distance } => write!(
                 f,
-                "the model does not stay at rest: after element {element} a coordinate or momentum is {distance:e}"
+                "the model does not stay at rest: after element {element} a coordinate or momentum is {distance:e}; count coordinates and momenta from an equilibrium"
             ),
             Self::Eigenvalues(error) => error.fmt(f),
         }
