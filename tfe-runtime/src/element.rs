@@ -14,13 +14,15 @@ use crate::quadrature::{MAX_POINTS, Quadrature};
 /// | `ThreeField` | q of degree s, v and p of degree s − 1 | the same | p on both sides |
 /// | `EnergyConserving` | (p, q) of degree s, continuous | degree s − 1 | none |
 /// | `Radau` | (p, q) of degree s − 1 | degree s − 1 | left side |
+///
+/// `docs/theory.md` §6 puts them into one frame, (T-31), and §7 has the table of their properties.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Family {
-    /// Displacement form.
+    /// Displacement form: Hamilton's law of varying action (T-4), the paper's (9).
     Primal,
-    /// Two-field form.
+    /// Two-field form (T-5), the paper's (10).
     Mixed,
-    /// Three-field form: coordinates, velocities and momenta are unknowns of their own.
+    /// Three-field form (T-3), the paper's (6): coordinates, velocities and momenta are unknowns of their own.
     ThreeField,
     /// Two-field form with trial and test spaces exchanged.
     EnergyConserving,
@@ -77,7 +79,7 @@ impl Family {
     }
 }
 
-/// The quadrature rule: where the forces of an element are evaluated.
+/// The quadrature rule: the points of an element at which the model is evaluated, and their weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rule {
     /// The rule that suits the family: `Primal` n Gauss points, `Mixed` and `ThreeField` n − 1 Gauss points,
@@ -126,13 +128,14 @@ impl Element {
         }
     }
 
-    /// Displacement form with full quadrature.
+    /// Displacement form (theory.md (T-4), the paper's (9)) with n Gauss points; see [`Primal`](markers::Primal).
     #[must_use]
     pub const fn primal(nodes: usize) -> Self {
         Self::new(Family::Primal, nodes)
     }
 
-    /// Two-field form; its default rule makes it Gauss collocation.
+    /// Two-field form (theory.md (T-5), the paper's (10)); with n − 1 Gauss points, the default, it is Gauss
+    /// collocation. See [`Mixed`](markers::Mixed).
     #[must_use]
     pub const fn mixed(nodes: usize) -> Self {
         Self::new(Family::Mixed, nodes)
@@ -150,20 +153,21 @@ impl Element {
         Self::new(Family::ThreeField, nodes)
     }
 
-    /// Continuous trial and discontinuous test functions: conserves the energy as far as the rule integrates it
-    /// exactly.
+    /// Continuous trial and discontinuous test functions: conserves the energy as far as the rule integrates it exactly
+    /// (theory.md (T-52)); see [`EnergyConserving`](markers::EnergyConserving).
     #[must_use]
     pub const fn energy_conserving(nodes: usize) -> Self {
         Self::new(Family::EnergyConserving, nodes)
     }
 
-    /// One-sided jump: L-stable, dissipative.
+    /// One-sided jump, Radau IIA: L-stable, dissipative; see [`Radau`](markers::Radau).
     #[must_use]
     pub const fn radau(nodes: usize) -> Self {
         Self::new(Family::Radau, nodes)
     }
 
-    /// The same with n − 1 Gauss points.
+    /// The same with n − 1 Gauss points (reduced integration), by which a primal element becomes A-stable and the same map
+    /// as the mixed one.
     #[must_use]
     pub const fn reduced(self) -> Self {
         self.quadrature(self.nodes.saturating_sub(1))
@@ -291,7 +295,14 @@ impl Element {
         }
     }
 
-    /// The order of accuracy in the states at the nodes, for smooth models.
+    /// The order of accuracy in the states at the nodes, for smooth models: their error is O(h^order). With n nodes and the
+    /// default rule it is
+    ///
+    /// ```text
+    /// 2(n − 1) ,     Radau: 2n − 3 ,
+    /// ```
+    ///
+    /// and the order of the rule, its degree of exactness plus one, if that is lower.
     #[must_use]
     pub const fn order(&self) -> usize {
         let s = self.degree();
@@ -446,15 +457,44 @@ pub mod markers {
     }
 
     markers! {
-        /// Displacement form: N nodes, full quadrature.
+        /// Displacement form with n = `NODES` nodes and n Gauss points: Hamilton's law of varying action,
+        ///
+        /// ```text
+        /// ∫ { L_v·δq̇ + (L_q + Q)·δq } dt = p₁·δq₁ − p₀·δq₀ ,   v = q̇                    (theory.md (T-4), the paper's (9))
+        /// ```
+        ///
+        /// Order 2(n − 1), symplectic. Stable up to a limit of the step only, with unstable intervals below it (T-57); with
+        /// [`reduced`](Self::reduced) quadrature it is A-stable and the same map as [`Mixed`].
         Primal, primal;
-        /// Two-field form: N nodes, N − 1 Gauss points.
+        /// Two-field form with n = `NODES` nodes and n − 1 Gauss points,
+        ///
+        /// ```text
+        /// ∫ { p·δq̇ − q·δṗ − H_p·δp + (Q − H_q)·δq } dt = [ p·δq − q·δp ]₀¹              (theory.md (T-5), the paper's (10))
+        /// ```
+        ///
+        /// Order 2(n − 1), symplectic, A-stable; conserves quadratic first integrals. It is the collocation method with n − 1
+        /// Gauss points.
         Mixed, mixed;
-        /// Three-field form: velocities are unknowns of their own.
+        /// Three-field form with n = `NODES` nodes and n − 1 Gauss points: coordinates, velocities and momenta are
+        /// independent,
+        ///
+        /// ```text
+        /// ∫ { p·δq̇ − q·δṗ + (L_q + Q)·δq − v·δp + (L_v − p)·δv } dt = [ p·δq − q·δp ]₀¹    (theory.md (T-3), the paper's (6))
+        /// ```
+        ///
+        /// The same map as [`Mixed`] where the mass matrix L_vv is regular; it may be singular where constraints determine
+        /// the motion. Order 2(n − 1), symplectic, A-stable.
         ThreeField, three_field;
-        /// Continuous trial and discontinuous test functions.
+        /// Two-field form with n = `NODES` nodes, continuous trial and discontinuous test functions, and 2n Gauss points.
+        ///
+        /// Order 2(n − 1), A-stable. The energy of an autonomous model changes by the work of the forces, up to the error of
+        /// the quadrature (theory.md (T-52)): exactly if H is a polynomial of degree at most 4n/(n − 1). Symplectic for
+        /// linear models only.
         EnergyConserving, energy_conserving;
-        /// One-sided jump: L-stable, dissipative.
+        /// Two-field form with n = `NODES` nodes, a jump on the left side only, and n − 1 right Radau points: the Radau IIA
+        /// method (theory.md §6.9).
+        ///
+        /// Order 2n − 3, A- and L-stable, not symplectic: it damps fast oscillations. For stiff damped models.
         Radau, radau;
     }
 }
