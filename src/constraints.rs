@@ -168,8 +168,9 @@ pub trait ConsistentState<const N: usize>: Model<N> + Sized {
     /// The consistent state nearest to (q, v) at t = 0; see [`consistent_state_at`](Self::consistent_state_at).
     ///
     /// # Errors
-    /// [`ConsistentError`].
+    /// As from [`consistent_state_at`](Self::consistent_state_at).
     ///
+    /// # Example
     /// ```
     /// use tfe::prelude::*;
     ///
@@ -197,11 +198,17 @@ pub trait ConsistentState<const N: usize>: Model<N> + Sized {
     /// The coordinates move to the nearest point with φ(q, t) = 0, in the sense of least |δq|; where constraints of tiny
     /// lengths beside angles are independent only in the units of the kinetic energy, in these. The velocities then
     /// change to satisfy A v + a = 0 with the least kinetic energy ½ δvᵀ L_vv δv of the change, as by an impulse of
-    /// the reactions. Without constraints, the state itself is returned.
+    /// the reactions:
+    ///
+    /// ```text
+    /// q ← q − A⁺ φ(q, t) + (I − A⁺A)(q_given − q)   (repeated) ;     L_v(v) + Aᵀν = L_v(v_given) ,   A v + a = 0      (T-96)
+    /// ```
+    ///
+    /// with A⁺ the pseudoinverse of A = φ_q. Without constraints, the state itself is returned.
     ///
     /// # Errors
-    /// [`ConsistentError`] if the constraints are not reached from (q, v), if a value is not finite or the mass matrix is
-    /// singular there, or if the model does not pass its check.
+    /// [`ConsistentError::Unreached`] if the constraints are not reached from (q, v), [`ConsistentError::Model`] if a value
+    /// is not finite or the mass matrix is singular there, [`ConsistentError::Check`] if the model does not pass its check.
     fn consistent_state_at(
         &self,
         t: f64,
@@ -299,8 +306,8 @@ fn step_to_constraints<M: Model<N>, const N: usize>(
 /// is the identity.
 ///
 /// # Errors
-/// [`StepError`] if no velocity belongs to the momenta at the state, or the model does not pass its
-/// [check](Model::check).
+/// [`StepError::Inconsistent`] if the model does not pass its [check](Model::check); [`StepError::Constraint`],
+/// [`StepError::Legendre`] or [`StepError::NonFinite`] if no velocity belongs to the momenta at the state.
 pub fn tangent_basis<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,

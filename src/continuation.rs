@@ -265,7 +265,11 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
     /// Follows the branch and locates its bifurcations.
     ///
     /// # Errors
-    /// [`ContinuationError`] says why the continuation failed, and holds the branch up to there.
+    /// [`ContinuationError`] holds the branch up to the failure and its [kind](ContinuationErrorKind): for invalid settings
+    /// [`NoParameter`](ContinuationErrorKind::NoParameter), [`NoSensitivity`](ContinuationErrorKind::NoSensitivity),
+    /// [`NoRange`](ContinuationErrorKind::NoRange), [`Range`](ContinuationErrorKind::Range) or
+    /// [`Steps`](ContinuationErrorKind::Steps); [`Start`](ContinuationErrorKind::Start) if the first orbit is not found;
+    /// [`Step`](ContinuationErrorKind::Step) if the branch cannot be followed even with the smallest step.
     pub fn run(&self) -> Result<Branch<M, N>, ContinuationError<M, N>> {
         let mut branch = Branch::new("");
         match self.follow(&mut branch) {

@@ -353,7 +353,7 @@ impl fmt::Display for RunErrorKind {
             }
             Self::Span { start, end } => {
                 let (start, end) = (Short(*start), Short(*end));
-                write!(f, "the span {start}..{end} has an end that is not finite; `steps` runs without an end")
+                write!(f, "the span {start}..{end} has an end that is not finite: give finite times; `steps` needs no end")
             }
             Self::TooManySteps { span, step } => {
                 let (span, step) = (Short(*span), Short(*step));

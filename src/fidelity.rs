@@ -202,7 +202,12 @@ impl<'m> Fidelity<'m> {
     /// other runs are made nevertheless.
     ///
     /// # Errors
-    /// [`FidelityError`] if there is nothing to compare, or the reference fails.
+    /// If there is nothing to compare [`FidelityError::NoRungs`], [`SameName`](FidelityError::SameName),
+    /// [`NoOutputs`](FidelityError::NoOutputs), [`UnknownOutput`](FidelityError::UnknownOutput) or
+    /// [`Model`](FidelityError::Model); for invalid settings [`NoElements`](FidelityError::NoElements),
+    /// [`Element`](FidelityError::Element), [`NoAccuracies`](FidelityError::NoAccuracies),
+    /// [`Accuracy`](FidelityError::Accuracy), [`Parts`](FidelityError::Parts) or [`Span`](FidelityError::Span);
+    /// [`Reference`](FidelityError::Reference) or [`ReferenceValue`](FidelityError::ReferenceValue) if the reference fails.
     pub fn run(&self) -> Result<Ladder, FidelityError> {
         let grids = self.grids()?;
         let (names, wanted) = self.wanted()?;

@@ -122,8 +122,11 @@ impl<const N: usize, L: Length<N>> Linearised<N, L> {
     /// [`on_constraints`](Self::on_constraints).
     ///
     /// # Errors
-    /// [`PeriodicSchurError`] if a matrix is not finite or the iteration does not converge.
+    /// [`PeriodicSchurError::NonFinite`] if a matrix is not finite, [`NoConvergence`](PeriodicSchurError::NoConvergence) if
+    /// the iteration does not converge, [`Constraints`](PeriodicSchurError::Constraints) if there are no matrices
+    /// [on the constraints](Self::on_constraints).
     ///
+    /// # Example
     /// ```
     /// use tfe::prelude::*;
     ///

@@ -84,8 +84,12 @@ impl<'m, M: Reducible<S>, S: PhasePoint, const R: usize> Modal<'m, M, R, S> {
     /// The reduction to the `R` modes of least ω².
     ///
     /// # Errors
-    /// [`ModalError`] if the model is not linear, depends on time, has forces, dissipation, constraints, or products
-    /// of coordinates and velocities, if its mass matrix is not positive definite, or if it has fewer than `R` modes.
+    /// [`ModalError::NotLinear`], [`TimeDependent`](ModalError::TimeDependent), [`Forced`](ModalError::Forced) (forces or
+    /// dissipation), [`Constrained`](ModalError::Constrained) or [`VelocityCoupling`](ModalError::VelocityCoupling)
+    /// (products of coordinates and velocities) for a model without modes of this kind;
+    /// [`MassNotPositive`](ModalError::MassNotPositive), [`NotFinite`](ModalError::NotFinite) or
+    /// [`NoEigenvalues`](ModalError::NoEigenvalues) for its matrices; [`Modes`](ModalError::Modes) if `R` is zero or more
+    /// than there are coordinates; [`Family`](ModalError::Family) if the model does not pass its check.
     pub fn of(full: &'m M) -> Result<Self, ModalError> {
         let quadratic = full.quadratic()?;
         let coordinates = quadratic.slope_q.len();

@@ -258,8 +258,16 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
     /// Solves the problem.
     ///
     /// # Errors
-    /// [`OptimalControlError`] if the problem is invalid, or if no minimum was found from the guess; it then holds the
-    /// last iterate.
+    /// [`OptimalControlError`], whose [kind](OptimalControlErrorKind) is, for an invalid problem,
+    /// [`Ends`](OptimalControlErrorKind::Ends), [`Backwards`](OptimalControlErrorKind::Backwards),
+    /// [`Model`](OptimalControlErrorKind::Model), [`Element`](OptimalControlErrorKind::Element),
+    /// [`Constrained`](OptimalControlErrorKind::Constrained), [`NoCost`](OptimalControlErrorKind::NoCost),
+    /// [`UnknownOutput`](OptimalControlErrorKind::UnknownOutput),
+    /// [`EndCostOfInput`](OptimalControlErrorKind::EndCostOfInput), [`Input`](OptimalControlErrorKind::Input),
+    /// [`Degree`](OptimalControlErrorKind::Degree) or [`Legendre`](OptimalControlErrorKind::Legendre). If no minimum was
+    /// found from the guess, it is [`Undefined`](OptimalControlErrorKind::Undefined),
+    /// [`Singular`](OptimalControlErrorKind::Singular), [`Stalled`](OptimalControlErrorKind::Stalled) or
+    /// [`NoMinimum`](OptimalControlErrorKind::NoMinimum), and the error holds the last iterate.
     pub fn solve(&self) -> Result<Optimum<N>, OptimalControlError<N>> {
         self.check()?;
         let (running, end) = (self.columns(&self.running)?, self.columns(&self.end)?);

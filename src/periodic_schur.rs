@@ -116,8 +116,11 @@ impl Multiplier {
 /// largest eigenvalue. Factors of size 0 × 0 give the empty list.
 ///
 /// # Errors
-/// [`PeriodicSchurError`] for an empty list, for sizes that do not match, for entries that are not finite, and if the
-/// iteration does not converge, which has been seen only if the entries of one factor span the whole range of `f64`.
+/// [`PeriodicSchurError::Empty`] for an empty list; [`NotSquare`](PeriodicSchurError::NotSquare) and
+/// [`SizeMismatch`](PeriodicSchurError::SizeMismatch) for sizes that do not match;
+/// [`NonFinite`](PeriodicSchurError::NonFinite) for entries that are not finite;
+/// [`NoConvergence`](PeriodicSchurError::NoConvergence), which has been seen only if the entries of one factor span the
+/// whole range of `f64`.
 ///
 /// # Example
 /// A product whose explicit form loses its small eigenvalue:

@@ -49,9 +49,11 @@ use tfe_runtime::{Element, Model, State};
 /// # Shapes
 /// 2N × 2N, ordered (p, q); [`Blocks`] names its four blocks.
 /// # Errors
-/// [`TransitionError`] (or `family::OperatorError`) if the element does not exist, cannot be solved, or has a singular
-/// tangent.
+/// [`TransitionError::Element`] if the element does not exist, [`TransitionError::Step`] if the model does not pass its
+/// check, or the element cannot be solved or has a singular tangent. For models of run-time length
+/// `family::OperatorError`, with the same meanings.
 ///
+/// # Example
 /// ```
 /// use tfe::prelude::*;
 ///

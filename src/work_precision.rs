@@ -293,8 +293,12 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
     /// made nevertheless.
     ///
     /// # Errors
-    /// [`WorkPrecisionError`] if elements, step sizes, span, start or reference are invalid, so that no run is
-    /// possible.
+    /// If no run is possible [`WorkPrecisionError::NoElements`], [`NoSteps`](WorkPrecisionError::NoSteps),
+    /// [`Element`](WorkPrecisionError::Element), [`Span`](WorkPrecisionError::Span), [`Step`](WorkPrecisionError::Step),
+    /// [`TooManySteps`](WorkPrecisionError::TooManySteps) or [`Start`](WorkPrecisionError::Start); without a usable
+    /// reference [`ReferenceRun`](WorkPrecisionError::ReferenceRun),
+    /// [`ReferenceValue`](WorkPrecisionError::ReferenceValue) or
+    /// [`ReferenceLength`](WorkPrecisionError::ReferenceLength).
     pub fn run(&self) -> Result<Measurements, WorkPrecisionError> {
         let grids = self.grids()?;
         self.check_start(&grids)?;

@@ -276,8 +276,13 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     /// reported as [`AssemblyError::Singular`].
     ///
     /// # Errors
-    /// [`BoundaryError`] if the model does not pass its check, the conditions or the mesh are invalid, or no solution is
-    /// found from the guess.
+    /// For an invalid problem [`BoundaryError::Span`], [`Count`](BoundaryError::Count),
+    /// [`Component`](BoundaryError::Component), [`Twice`](BoundaryError::Twice), [`Value`](BoundaryError::Value),
+    /// [`Mesh`](BoundaryError::Mesh). [`BoundaryError::Assembly`] holds [`AssemblyError::Model`] or
+    /// [`Element`](AssemblyError::Element) for a model or an element that is invalid, and
+    /// [`Singular`](AssemblyError::Singular), [`Stalled`](AssemblyError::Stalled),
+    /// [`Linearise`](AssemblyError::Linearise), [`Legendre`](AssemblyError::Legendre) or
+    /// [`Violated`](AssemblyError::Violated) if no solution is found from the guess.
     pub fn solve(&self) -> Result<BoundaryMotion<'m, M, N>, BoundaryError> {
         self.check()?;
         let mut problem = self.problem()?;

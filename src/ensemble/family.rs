@@ -46,9 +46,9 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`EnsembleError`] if nothing can run: the element does not exist, the step size or the span is not finite, or
-    /// the number of starts does not fit the number of models. An invalid start, or a model whose lengths do not fit
-    /// each other, fails its own run only.
+    /// If nothing can run: [`EnsembleError::Run`] if the element does not exist or the step size or the span is invalid,
+    /// [`EnsembleError::Starts`] if the number of starts does not fit the number of models. An invalid start, or a model
+    /// whose lengths do not fit each other, fails its own run only.
     pub fn run(
         &self,
         starts: &[FamilyState],

@@ -236,9 +236,9 @@ where
     /// the end, or the error of that run; a failure does not stop other runs.
     ///
     /// # Errors
-    /// [`EnsembleError`] if nothing can run: the element does not exist, the step size or the span is not finite, or
-    /// the number of starts does not fit the number of models. An invalid start, or a model that does not pass its
-    /// [check](Model::check), fails its own run only.
+    /// If nothing can run: [`EnsembleError::Run`] if the element does not exist or the step size or the span is invalid,
+    /// [`EnsembleError::Starts`] if the number of starts does not fit the number of models. An invalid start, or a model
+    /// that does not pass its [check](Model::check), fails its own run only.
     pub fn run(&self, starts: &[State<N>], span: Range<f64>) -> Result<Ends<N>, EnsembleError> {
         let count = self.models.count(starts.len())?;
         let results = Mutex::new(Results::new(count));
@@ -260,6 +260,7 @@ where
     /// # Errors
     /// As from [`run`](Self::run).
     ///
+    /// # Example
     /// ```
     /// # use tfe::prelude::*;
     /// use std::sync::atomic::{AtomicUsize, Ordering};

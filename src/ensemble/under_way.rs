@@ -90,8 +90,8 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`EnsembleError`] if the element does not exist, or the number of starts does not fit the number of models. An
-    /// invalid start fails its own run only.
+    /// [`EnsembleError::Run`] if the element does not exist, [`EnsembleError::Starts`] if the number of starts does not fit
+    /// the number of models. An invalid start fails its own run only.
     pub fn begin(
         &self,
         starts: &[State<N>],
@@ -139,8 +139,8 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`EnsembleError`] if the element does not exist, or the number of starts does not fit the number of models. An
-    /// invalid start fails its own run only.
+    /// [`EnsembleError::Run`] if the element does not exist, [`EnsembleError::Starts`] if the number of starts does not fit
+    /// the number of models. An invalid start fails its own run only.
     pub fn begin(
         &self,
         starts: &[FamilyState],
@@ -227,7 +227,7 @@ where
     /// one thousandth of the first span.
     ///
     /// # Errors
-    /// [`EnsembleError`] if the step size or the span is not finite; nothing is changed then.
+    /// [`EnsembleError::Run`] if the step size or the span is invalid; nothing is changed then.
     pub fn run_to(&mut self, end: f64) -> Result<Ends<N, L>, EnsembleError> {
         let Self {
             ensemble,

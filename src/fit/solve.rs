@@ -12,7 +12,12 @@ impl<M: Model<N>, const N: usize> Fit<'_, M, N> {
     /// Fits the parameters.
     ///
     /// # Errors
-    /// [`FitError`] says what cannot be fitted, or why the iteration failed.
+    /// If something is missing or invalid [`FitError::NothingUnknown`], [`NothingMeasured`](FitError::NothingMeasured),
+    /// [`NoParameter`](FitError::NoParameter), [`NotCopied`](FitError::NotCopied), [`NoOutput`](FitError::NoOutput),
+    /// [`Measured`](FitError::Measured), [`Bounds`](FitError::Bounds), [`Early`](FitError::Early),
+    /// [`StartOfConstraints`](FitError::StartOfConstraints) or [`TooFew`](FitError::TooFew). [`Run`](FitError::Run) or
+    /// [`NotFinite`](FitError::NotFinite) if the first run fails, [`NotConverged`](FitError::NotConverged) if no minimum is
+    /// found, [`Undetermined`](FitError::Undetermined) if the measured values do not determine all unknowns.
     pub fn solve(&self) -> Result<Fitted<M, N>, FitError> {
         let columns = self.columns()?;
         let (t0, guess, start_is_known) = self.first(&columns)?;

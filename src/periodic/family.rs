@@ -21,7 +21,8 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
     /// Finds the orbit and its Floquet multipliers.
     ///
     /// # Errors
-    /// [`OrbitError`] if a setting is invalid, or if no orbit is found from the guess.
+    /// As for models of fixed size; also [`OrbitError::Family`] for a model that is invalid or not supported, or steps that
+    /// cannot be differentiated, and [`OrbitError::Unsupported`] with [`advance`](Self::advance).
     pub fn solve(&self) -> Result<Orbit<'m, M, 0, RunTimeLength>, OrbitError> {
         orbit_of(self.solved()?)
     }

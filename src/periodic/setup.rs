@@ -258,7 +258,13 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// Finds the orbit and its Floquet multipliers.
     ///
     /// # Errors
-    /// [`OrbitError`] if the model does not pass its check, a setting is invalid, or no orbit is found from the guess.
+    /// For invalid settings [`OrbitError::NoPeriod`], [`Period`](OrbitError::Period), [`Number`](OrbitError::Number),
+    /// [`ForcedPeriod`](OrbitError::ForcedPeriod), [`Mesh`](OrbitError::Mesh), [`Phase`](OrbitError::Phase) or
+    /// [`Unsupported`](OrbitError::Unsupported); [`Guess`](OrbitError::Guess) if the run of the guess fails.
+    /// [`Assembly`](OrbitError::Assembly), [`NoFamily`](OrbitError::NoFamily) or [`AtRest`](OrbitError::AtRest) if no orbit
+    /// is found from the guess (`Assembly` also for an invalid model or element);
+    /// [`Constraints`](OrbitError::Constraints) or [`Multipliers`](OrbitError::Multipliers) if the orbit is found, but not
+    /// its multipliers.
     pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
         let (problem, iterate, assembly) = self.solved()?;
         Orbit::new(self.element, &problem, iterate, &assembly)

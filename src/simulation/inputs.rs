@@ -107,8 +107,10 @@ where
     /// before as functions or tables are used until they are set.
     ///
     /// # Errors
-    /// As from [`steps`](Self::steps).
+    /// [`RunErrorKind`], as from [`run`](Self::run) before its first element; [`RunErrorKind::Step`] if no step size was
+    /// set.
     ///
+    /// # Example
     /// ```
     /// use tfe::prelude::*;
     ///

@@ -28,8 +28,22 @@ where
     /// failed.
     ///
     /// # Errors
-    /// [`RunError`] says where and why the run stopped, and holds the motion up to there.
+    /// [`RunError`] says where and why the run stopped, and holds the motion up to there. Its [kinds](RunErrorKind) are
     ///
+    /// - before the first element: [`Element`](RunErrorKind::Element), [`Family`](RunErrorKind::Family) for an element or a
+    ///   model that is invalid or not supported; [`Span`](RunErrorKind::Span), [`Step`](RunErrorKind::Step),
+    ///   [`TooManySteps`](RunErrorKind::TooManySteps), [`StepUnresolved`](RunErrorKind::StepUnresolved),
+    ///   [`NodeOrder`](RunErrorKind::NodeOrder), [`NodeEnds`](RunErrorKind::NodeEnds) for the mesh;
+    ///   [`Start`](RunErrorKind::Start), [`Inconsistent`](RunErrorKind::Inconsistent) for the start;
+    ///   [`Impulse`](RunErrorKind::Impulse), [`NoEvent`](RunErrorKind::NoEvent), [`Input`](RunErrorKind::Input) for what
+    ///   else was set;
+    /// - later: [`Solve`](RunErrorKind::Solve) for an element that cannot be solved, [`Input`](RunErrorKind::Input) for a
+    ///   function of an input that fails in one; at events [`EventsWithoutEnd`](RunErrorKind::EventsWithoutEnd),
+    ///   [`NoParameter`](RunErrorKind::NoParameter), [`Parameter`](RunErrorKind::Parameter),
+    ///   [`ParametersFixed`](RunErrorKind::ParametersFixed), and [`Start`](RunErrorKind::Start),
+    ///   [`Inconsistent`](RunErrorKind::Inconsistent) for the state from which the run was to continue.
+    ///
+    /// # Example
     /// ```
     /// # use tfe::prelude::*;
     /// # #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - k/2*x^2)]
@@ -223,7 +237,8 @@ where
     /// An iterator over the nodes that follow `start`, one for each [step](Self::step), without end and in constant
     /// memory. A step size must be set; elements also end at [breaks](Self::break_at), as in [`run`](Self::run).
     ///
-    /// After an error the iterator ends. [`Steps::warnings`] lists signs that the steps so far may be wrong.
+    /// The errors are those of [`run`](Self::run), as [`RunErrorKind`]; after one the iterator ends. [`Steps::warnings`]
+    /// lists signs that the steps so far may be wrong.
     ///
     /// A step in which an [event](Self::on) changes the state or a parameter has two more nodes, with the states
     /// before and after the event; after the node at which an event stops the run the iterator ends. [`Steps::events`]

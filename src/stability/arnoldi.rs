@@ -100,7 +100,9 @@ impl Default for Iteration {
 /// products at best. About a stable equilibrium, all eigenvalues of a symplectic step have modulus one, and the
 /// iteration can converge only to one that is separated from the others on the unit circle.
 /// # Errors
-/// [`DominantError`]; [`NotConverged`](DominantError::NotConverged) holds the best value and its residual.
+/// [`DominantError::Empty`] for size zero, [`NotFinite`](DominantError::NotFinite) for a product that is not finite,
+/// [`Projected`](DominantError::Projected) if the eigenvalues of the projection are not found,
+/// [`NotConverged`](DominantError::NotConverged), with the best value and its residual, if no eigenvalue converges.
 /// # Reference
 /// G. W. Stewart, *A Krylov–Schur algorithm for large eigenproblems*, SIAM J. Matrix Anal. Appl. 23 (2001) 601–614.
 ///

@@ -71,9 +71,10 @@ const MODERATE: f64 = 1e100;
 /// eigenvalue of multiplicity r in one Jordan block is accurate to the r-th root of the rounding unit only, and may
 /// come out as a complex pair.
 /// # Errors
-/// [`EigenvalueError`] for a matrix that is not square or not finite, and if the sweeps do not converge.
+/// [`EigenvalueError::NotSquare`], [`NotFinite`](EigenvalueError::NotFinite), and
+/// [`NoConvergence`](EigenvalueError::NoConvergence) if the sweeps do not converge.
 /// # Reference
-/// [GVL, §7.5]
+/// G. H. Golub, C. F. Van Loan, *Matrix Computations*, §7.5.
 ///
 /// ```
 /// use nalgebra::DMatrix;

@@ -55,8 +55,10 @@ pub struct UnstableInterval {
 /// Modes that coincide for every parameter make ∏ (μᵢ − μⱼ)² vanish; a collision of other eigenvalues away from ±1 is
 /// then noticed only if one of some hundred samples falls into its interval.
 /// # Errors
-/// [`IntervalError`] for a range that is empty or not finite, a matrix that cannot be computed, or one that is not
-/// smooth.
+/// [`IntervalError::Range`] for a range that is empty or not finite; [`Matrix`](IntervalError::Matrix),
+/// [`Shape`](IntervalError::Shape), [`NotFinite`](IntervalError::NotFinite) or
+/// [`Eigenvalues`](IntervalError::Eigenvalues) if the matrix at a parameter is missing, not square or of another size, not
+/// finite, or without eigenvalues; [`Unresolved`](IntervalError::Unresolved) if it is not smooth.
 ///
 /// ```
 /// use nalgebra::DMatrix;

@@ -95,8 +95,9 @@ impl<const N: usize> LinearModel<N> {
     /// Linearises a model about `state` at a given time.
     ///
     /// # Errors
-    /// [`LinearModelError`] for a model with constraints or one that does not pass its check, a singular mass matrix, or
-    /// derivatives that are not finite.
+    /// [`LinearModelError::Constrained`] for a model with constraints, [`Model`](LinearModelError::Model) for one that does
+    /// not pass its check, [`NoVelocity`](LinearModelError::NoVelocity) if the mass matrix is singular at the state,
+    /// [`NotFinite`](LinearModelError::NotFinite) if a second derivative is not finite.
     pub fn about<M: Model<N>>(
         model: &M,
         t: f64,
@@ -135,7 +136,8 @@ impl<const N: usize> LinearModel<N> {
     /// The time scales of the linear model: the eigenvalues of its equations of motion.
     ///
     /// # Errors
-    /// [`EigenvalueError`] if a coefficient is not finite or the eigenvalues do not converge.
+    /// [`EigenvalueError::NotFinite`] if a coefficient is not finite, [`EigenvalueError::NoConvergence`] if the eigenvalues
+    /// do not converge.
     pub fn time_scales(&self) -> Result<TimeScales, EigenvalueError> {
         TimeScales::of(&self.generator())
     }

@@ -108,7 +108,9 @@ impl<M: family::Model> Transitions<M, 0> for RunTimeLength {
 /// # Shapes
 /// 2n numbers, ordered (p, q).
 /// # Errors
-/// [`family::OperatorError`] if the model or the step is invalid, or the step cannot be solved.
+/// [`family::OperatorError::Family`] if the model, the element or the state is invalid or not supported,
+/// [`Step`](family::OperatorError::Step) if the step cannot be solved or its tangent is singular,
+/// [`Cut`](family::OperatorError::Cut) if the step is so long that it had to be cut.
 ///
 /// ```
 /// use tfe::prelude::*;
@@ -146,7 +148,7 @@ pub fn transition<M: family::Model>(
 /// As for [`dominant_of`]. About a stable equilibrium, all eigenvalues of a symplectic step have modulus one: the
 /// result is then an error that holds the best value, or one of those eigenvalues; the residual says how good it is.
 /// # Errors
-/// [`DominantError`] if no eigenvalue converges or a product is not finite.
+/// As from [`dominant_of`].
 #[cfg(feature = "sparse")]
 pub fn dominant(
     transition: &family::TransitionOperator,

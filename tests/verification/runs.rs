@@ -466,7 +466,7 @@ fn messages_of_runs_say_what_to_do() {
         (missed(Some(2.0)).to_string(), "; allow a larger error"),
         (missed(None).to_string(), "; allow a larger error"),
         (nowhere.to_string(), "must be the first and the last node"),
-        (endless.to_string(), "`steps` runs without an end"),
+        (endless.to_string(), "`steps` needs no end"),
         (StepError::NonFinite.to_string(), "a singular point"),
         (
             StepError::SingularTangent { unknown: 3 }.to_string(),

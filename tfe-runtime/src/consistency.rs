@@ -81,7 +81,8 @@ pub enum ModelError {
         /// The number of coordinates.
         expected: usize,
     },
-    /// ∂²/∂z∂z has an entry off its diagonal, or is not constant: not supported yet.
+    /// ∂²/∂z∂z has an entry off its diagonal, which only Lagrangians may have, with the feature
+    /// `sparse`.
     MassNotDiagonal {
         /// The row of the entry.
         row: usize,
@@ -95,7 +96,8 @@ pub enum ModelError {
     },
     /// No velocity belongs to a momentum, or no momentum to a velocity: ∂²/∂z∂z is singular, or values are not finite.
     NoVelocity,
-    /// The equations are not of the form M q̈ = f with a constant diagonal M: not supported yet.
+    /// The equations are not of the form M q̈ = f with a constant diagonal M, which is supported only for Lagrangians, with
+    /// the feature `sparse`.
     NotSecondOrder,
     /// The element is invalid.
     Element(ElementError),
@@ -190,7 +192,7 @@ impl fmt::Display for ModelError {
             ),
             Self::MassNotDiagonal { row, column } => write!(
                 f,
-                "the mass matrix has an entry off its diagonal, ({row}, {column}): enable the feature `sparse`, without which models of run-time length need a diagonal mass matrix"
+                "the mass matrix has an entry off its diagonal, ({row}, {column}): models of run-time length need a diagonal mass matrix, except Lagrangians with the feature `sparse`"
             ),
             Self::SingularMass { coordinate } => write!(
                 f,

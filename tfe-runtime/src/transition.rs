@@ -38,8 +38,9 @@ use wanted::{Matrix, Product, Wanted};
 /// returns the end of the step.
 ///
 /// # Errors
-/// [`TransitionError`] if the model does not pass its [check](Model::check), the element is invalid, the step fails, or
-/// `matrix` is shorter than 4N².
+/// [`TransitionError::Element`] if the element is invalid; [`TransitionError::Step`] if the model does not pass its
+/// [check](Model::check), the step fails or its tangent is singular; [`TransitionError::Shape`] if `matrix` is shorter than
+/// 4N².
 #[cfg(feature = "alloc")]
 pub fn of_step<M, const N: usize>(
     model: &M,

@@ -140,7 +140,9 @@ where
     /// Runs over the span with an element and a step size that meet the accuracy.
     ///
     /// # Errors
-    /// [`RunError`], as from [`Simulation::run`]. [`RunErrorKind::AccuracyMissed`] if no step size was found that
+    /// [`RunError`], as from [`Simulation::run`]. [`RunErrorKind::Accuracy`] unless the accuracy is between 0 and 1;
+    /// [`RunErrorKind::TooManySteps`] if it would take more than ten million steps;
+    /// [`RunErrorKind::AccuracyMissed`] if no step size was found that
     /// meets the accuracy, for example because the motion is chaotic and the span too long, or the accuracy is below
     /// the effect of rounding; the best motion is in [`partial`](RunError::partial).
     pub fn run(

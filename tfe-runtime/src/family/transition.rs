@@ -105,7 +105,8 @@ impl TransitionOperator {
     /// The derivative of the step from `state` at time t to t + h.
     ///
     /// # Errors
-    /// [`OperatorError`] if a step of this model is impossible or fails, and for a state of another length.
+    /// [`OperatorError::Family`] if the model or the element is invalid or not supported, or the state has another length;
+    /// [`OperatorError::Step`] if the step fails or its tangent is singular; [`OperatorError::Cut`] if it had to be cut.
     pub fn of_step<M: Model>(
         model: &M,
         element: Element,
