@@ -1,8 +1,8 @@
 //! Constrained models: consistent initial conditions, reactions, and the motions that the constraints allow.
 //!
 //! A model with `constraint(name) = …` is simulated like any other. A constraint is either holonomic, φ(q, t) = 0, or
-//! linear in the velocities, A(q, t) v + a(q, t) = 0; for a holonomic one A = φ_q and a = φ_t. Theory:
-//! `docs/theory.md`, constraints.
+//! linear in the velocities, A(q, t) v + a(q, t) = 0; for a holonomic one A = φ_q and a = φ_t. The equations of motion
+//! with multipliers are (T-92) in `docs/theory.md`, §11, and those of an element (T-72), (T-73) and (T-80).
 
 pub(crate) mod allowed;
 mod projection;
@@ -135,6 +135,23 @@ impl ConstraintResidual {
 /// state. If constraints are dependent, several λ give the same forces; the one with least Σ λ² is returned.
 ///
 /// Constraints of models of run-time length are named by their sites: `rod[0]`, `rod[1]`, …
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x, y), lagrangian = m/2*(dot(x)^2 + dot(y)^2) - m*g*y, constraint(rod) = x^2 + y^2 - l^2)]
+/// struct RodPendulum { m: f64, l: f64, g: f64 }
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let pendulum = RodPendulum { m: 1.0, l: 2.0, g: 9.81 };
+/// let hanging = pendulum.state([0.0, -2.0], [0.0, 0.0]);
+/// let motion = Simulation::new(&pendulum).step(0.1).run(hanging, 0.0..1.0)?;
+/// let rod = motion.reactions().column("rod").ok_or("the model declares it")?;
+/// // The force Aᵀλ with A = (2x, 2y) carries the weight: 2 y λ = m g.
+/// assert!((2.0 * (-2.0) * rod[0] - 9.81).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reactions<Name = &'static str> {
     pub(crate) names: Vec<Name>,
@@ -308,6 +325,23 @@ fn step_to_constraints<M: Model<N>, const N: usize>(
 /// # Errors
 /// [`StepError::Inconsistent`] if the model does not pass its [check](Model::check); [`StepError::Constraint`],
 /// [`StepError::Legendre`] or [`StepError::NonFinite`] if no velocity belongs to the momenta at the state.
+///
+/// # Example
+/// ```
+/// use tfe::constraints::tangent_basis;
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - y, constraint(rod) = x^2 + y^2 - 1)]
+/// struct Pendulum;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let hanging = Pendulum.state([0.0, -1.0], [0.0, 0.0]);
+/// let basis = tangent_basis(&Pendulum, 0.0, &hanging)?;
+/// assert_eq!(basis.shape(), (4, 2)); // δp_x and δx only
+/// assert!(basis.row(1).norm() < 1e-14 && basis.row(3).norm() < 1e-14);
+/// # Ok(())
+/// # }
+/// ```
 pub fn tangent_basis<M: Model<N>, const N: usize>(
     model: &M,
     t: f64,

@@ -265,6 +265,20 @@ impl RunErrorKind {
 }
 
 /// A run that stopped before its end: why, and the motion up to the last good state.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x), momenta(p), hamiltonian = p^2/2 + 2*sqrt(x))]
+/// struct Fall;
+///
+/// // From rest at x = 1 to x = 0 at t = 4/3, where the square root ends.
+/// let start = State { q: [1.0], p: [0.0] };
+/// let run = Simulation::new(&Fall).element(Mixed::<3>).step(0.01).run(start, 0.0..3.0);
+/// let error = run.expect_err("there is nothing beyond zero");
+/// assert!((error.partial().last().t - 4.0 / 3.0).abs() < 0.04);
+/// println!("{error}"); // where, why, what to do
+/// ```
 #[derive(Clone, Debug)]
 pub struct RunError<const N: usize, L: Length<N> = FixedLength> {
     kind: RunErrorKind,

@@ -41,7 +41,26 @@ use tfe_runtime::{CoordinateName, Statistics};
 ///
 /// The nodes are the ends of the elements (every one, or every k-th after
 /// [`record_every`](crate::Simulation::record_every)). Between the nodes, [`at`](Self::at) evaluates the element's own
-/// polynomial (dense output).
+/// polynomial (dense output). All numbers are in the units of the model.
+///
+/// ```
+/// use tfe::prelude::*;
+///
+/// #[dynamics(coordinates(x), lagrangian = (dot(x)^2 - x^2)/2, output(potential) = x^2/2)]
+/// struct Oscillator;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let simulation = Simulation::new(&Oscillator).element(Mixed::<6>).step(0.1);
+/// let motion = simulation.run(Oscillator.state([1.0], [0.0]), 0.0..10.0)?;
+/// assert_eq!(motion.states().len(), 101);
+/// assert!((motion.last().q[0] - 10.0_f64.cos()).abs() < 1e-12);
+/// assert!((motion.at(0.55)?.q[0] - 0.55_f64.cos()).abs() < 1e-7); // between two nodes
+/// assert!(motion.energy_error() < 1e-13);
+/// let potential = motion.outputs().column("potential").ok_or("the model declares it")?;
+/// assert!((potential[0] - 0.5).abs() < 1e-15);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// For a model of run-time length with n coordinates each node takes 4 n numbers of memory, and the polynomial of an
 /// element with s stages 2 s n more. For long chains and long runs, use `record_every` to keep fewer nodes and no

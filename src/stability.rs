@@ -40,7 +40,7 @@ use tfe_runtime::{Element, Model, State};
 /// The transition matrix A of one element (time step): the derivative of the step map (p, q) ↦ (p, q) at `state`.
 ///
 /// ```text
-/// (δp₁, δq₁) = A (δp₀, δq₀)                                       (theory.md, transition matrices; the paper's (27))
+/// (δp₁, δq₁) = A (δp₀, δq₀)                                                          (theory.md (T-30), the paper's (27))
 /// ```
 ///
 /// With the feature `sparse` also for models of run-time length; for a long one use `transition`, which gives an

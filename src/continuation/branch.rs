@@ -240,7 +240,6 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
     ///
     /// # Errors
     /// Those of the file system.
-    /// Those of the file system.
     pub fn write_csv(&self, path: impl AsRef<Path>) -> io::Result<()> {
         let mut names = vec!["period".to_owned()];
         names.extend((0..N).map(|a| format!("amplitude_{}", M::coordinate_name(a))));

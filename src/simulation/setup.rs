@@ -338,9 +338,26 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Adds an impulse: a generalized force that acts at the instant `time` and has the time integral `impulse`, one
     /// number for each coordinate, in units of that coordinate's momentum.
     ///
-    /// Inside an element the impulse is weighted by the test functions; at a node it changes the momentum there, and
-    /// the recorded node at that instant shows the momentum before the impulse (`docs/theory.md`, impulses). In a run
-    /// backwards in time the impulse is subtracted, as the effect of any force is.
+    /// Inside an element the impulse is weighted by the test functions (T-49); at a node it changes the momentum there, and
+    /// the recorded node at that instant shows the momentum before the impulse. In a run backwards in time the impulse is
+    /// subtracted, as the effect of any force is.
+    ///
+    /// ```
+    /// use tfe::prelude::*;
+    ///
+    /// #[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2)]
+    /// struct Mass { m: f64 }
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let mass = Mass { m: 2.0 };
+    /// let simulation = Simulation::new(&mass).step(0.5).impulse(1.0, [3.0]);
+    /// let motion = simulation.run(mass.state([0.0], [0.0]), 0.0..2.0)?;
+    /// assert!(motion.states()[2].p[0].abs() < 1e-14); // at t = 1, before it
+    /// assert!((motion.last().p[0] - 3.0).abs() < 1e-14);
+    /// assert!((motion.last().q[0] - 1.5).abs() < 1e-14); // a second with v = 3/2
+    /// # Ok(())
+    /// # }
+    /// ```
     #[must_use]
     pub fn impulse(mut self, time: f64, impulse: [f64; N]) -> Self {
         self.impulses.push(Impulse {

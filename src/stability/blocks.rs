@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DMatrixView};
 ///
 /// ```text
 /// A = [ ∂p₁/∂p₀   ∂p₁/∂q₀ ]
-///     [ ∂q₁/∂p₀   ∂q₁/∂q₀ ]                                                                (docs/theory.md, transition matrices)
+///     [ ∂q₁/∂p₀   ∂q₁/∂q₀ ]                                                                (docs/theory.md (T-30))
 /// ```
 ///
 /// Each block is N × N, for a matrix of 2N × 2N, and a view without a copy. Derivatives with respect to initial

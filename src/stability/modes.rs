@@ -135,8 +135,9 @@ impl Mode {
 /// # Errors
 /// [`ModeError::Step`] for a step that is zero or not finite; otherwise those of [`eigenvalues()`].
 /// # Reference
-/// theory.md, transition matrices
+/// theory.md (T-30) for the matrix of a step, (T-83) for a monodromy matrix and its exponents.
 ///
+/// # Example
 /// ```
 /// use tfe::prelude::*;
 ///

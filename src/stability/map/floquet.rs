@@ -18,7 +18,7 @@ impl MapPlan {
     /// monodromy matrix,
     ///
     /// ```text
-    /// Φ = A_K … A_2 A_1 ,     ρ = max |λ(Φ)| .                    (theory.md, transition matrices)
+    /// Φ = A_K … A_2 A_1 ,     ρ = max |λ(Φ)| .                    (theory.md (T-83))
     /// ```
     ///
     /// For a model whose coefficients are constant, any T will do: ρ is then e^{σT}, with σ the largest growth rate.
