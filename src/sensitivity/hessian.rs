@@ -2,7 +2,6 @@
 
 use crate::length::{FixedLength, Length};
 use crate::sensitivity::loss::LossGradient;
-use crate::sensitivity::names::place_of;
 use nalgebra::DMatrix;
 
 /// The second derivatives of a loss with respect to some parameters, from
@@ -57,10 +56,22 @@ impl<const N: usize, L: Length<N>> LossHessian<N, L> {
     /// The second derivative ∂²ℓ/∂a∂b with respect to two parameters.
     ///
     /// # Panics
-    /// If one of the names was not asked for.
+    /// If one of the names was not asked for; [`get`](Self::get) returns `None` instead.
     #[track_caller]
     pub fn by(&self, a: &str, b: &str) -> f64 {
-        self.matrix[(place_of(a, &self.names), place_of(b, &self.names))]
+        let Some(derivative) = self.get(a, b) else {
+            panic!(
+                "the derivative with respect to `{a}` and `{b}` was not asked for, only those with respect to `{}`",
+                self.names.join("`, `")
+            )
+        };
+        derivative
+    }
+
+    /// The second derivative ∂²ℓ/∂a∂b with respect to two parameters; `None` if one of the names was not asked for.
+    pub fn get(&self, a: &str, b: &str) -> Option<f64> {
+        let place = |name: &str| self.names.iter().position(|own| own == name);
+        Some(self.matrix[(place(a)?, place(b)?)])
     }
 
     /// The matrix of all second derivatives: symmetric, rows and columns in the order of

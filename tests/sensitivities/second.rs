@@ -54,6 +54,8 @@ fn second_derivatives_are_those_of_a_closed_form() {
         }
         assert!(hessian.errors().amax() < 1e-9, "{}", hessian.errors());
         assert_eq!(hessian.parameters(), ["k", "c", "m"]);
+        assert_eq!(hessian.get("k", "m"), Some(hessian.by("m", "k")));
+        assert_eq!(hessian.get("k", "x"), None);
         assert_eq!(hessian.matrix(), &hessian.matrix().transpose());
         assert_eq!(hessian.gradient().parameters(), ["m", "k", "c"]);
     }
