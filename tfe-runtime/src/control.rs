@@ -1,6 +1,6 @@
 //! The choice of iteration, its tolerance, and the limit on the number of iterations.
 
-/// How the equations of an element are solved.
+/// How the equations of an element are solved: `docs/theory.md` §10.2 (fixed point) and §10.3 (Newton's method).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Solve {
     /// Fixed-point iteration while it contracts well, otherwise Newton's method; Newton's method from the start for

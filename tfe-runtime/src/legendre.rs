@@ -45,7 +45,8 @@ pub struct HamiltonianView<const N: usize> {
 /// The state (q, p) that belongs to given coordinates and velocities.
 ///
 /// # Errors
-/// [`LegendreError`] if the model is a Hamiltonian and no momentum is found.
+/// If the model is a Hamiltonian: [`LegendreError::Singular`] if H_pp is singular, [`LegendreError::Stalled`] if the
+/// iteration does not converge, [`LegendreError::NonFinite`] if a value is not finite.
 pub fn state<M, const N: usize>(
     model: &M,
     t: f64,
@@ -64,7 +65,8 @@ where
 /// The momentum p = L_v.
 ///
 /// # Errors
-/// [`LegendreError`] if the model is a Hamiltonian and no momentum is found.
+/// If the model is a Hamiltonian: [`LegendreError::Singular`] if H_pp is singular, [`LegendreError::Stalled`] if the
+/// iteration does not converge, [`LegendreError::NonFinite`] if a value is not finite.
 pub fn momentum<M, const N: usize>(
     model: &M,
     t: f64,
@@ -84,7 +86,8 @@ where
 /// The velocity v = H_p. For a Lagrangian it is found by Newton's method from `guess`, such as the last known velocity.
 ///
 /// # Errors
-/// [`LegendreError`] if the model is a Lagrangian and no velocity is found.
+/// If the model is a Lagrangian: [`LegendreError::Singular`] if L_vv is singular, [`LegendreError::Stalled`] if the
+/// iteration does not converge, [`LegendreError::NonFinite`] if a value is not finite.
 pub fn velocity<M, const N: usize>(
     model: &M,
     t: f64,
@@ -175,7 +178,8 @@ where
 /// The energy H(q, p, t); for a Lagrangian p·v − L.
 ///
 /// # Errors
-/// [`LegendreError`] if the model is a Lagrangian and no velocity is found.
+/// If the model is a Lagrangian: [`LegendreError::Singular`] if L_vv is singular, [`LegendreError::Stalled`] if the
+/// iteration does not converge, [`LegendreError::NonFinite`] if a value is not finite.
 pub fn energy<M, const N: usize>(
     model: &M,
     t: f64,
@@ -196,7 +200,8 @@ where
 /// The model as a Lagrangian at (t, q, v).
 ///
 /// # Errors
-/// [`LegendreError`] if the model is a Hamiltonian and no momentum is found.
+/// If the model is a Hamiltonian: [`LegendreError::Singular`] if H_pp is singular, [`LegendreError::Stalled`] if the
+/// iteration does not converge, [`LegendreError::NonFinite`] if a value is not finite.
 pub fn lagrangian_view<M, const N: usize>(
     model: &M,
     t: f64,
@@ -247,7 +252,8 @@ where
 /// The model as a Hamiltonian at (t, q, p).
 ///
 /// # Errors
-/// [`LegendreError`] if the model is a Lagrangian and no velocity is found.
+/// If the model is a Lagrangian: [`LegendreError::Singular`] if L_vv is singular, [`LegendreError::Stalled`] if the
+/// iteration does not converge, [`LegendreError::NonFinite`] if a value is not finite.
 pub fn hamiltonian_view<M, const N: usize>(
     model: &M,
     t: f64,

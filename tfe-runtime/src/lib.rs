@@ -6,8 +6,14 @@
 //! [`step::Method`] does the same on memory provided by the caller, without allocation.
 //!
 //! # Features
-//! `std` (default): elementary functions of the standard library instead of `libm`; `alloc`: elements chosen at run
-//! time, dense output, the nodal forms of [`weak_form`]. Without both the crate is `no_std` and does not allocate.
+//! - `std` (default): elementary functions of the standard library instead of `libm`.
+//! - `simd` (default): the points of an element in the widest vector registers of the processor, chosen when the program
+//!   runs.
+//! - `alloc` (part of both): elements chosen at run time, dense output, models of run-time length, the nodal forms of
+//!   [`weak_form`].
+//! - `sparse`: for models of run-time length, Newton's method, any kinetic energy, constraints and derivatives.
+//!
+//! Without features the crate is `no_std` and does not allocate.
 #![cfg_attr(not(feature = "std"), no_std)]
 
 #[cfg(feature = "alloc")]

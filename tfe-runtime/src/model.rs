@@ -467,7 +467,8 @@ impl core::fmt::Display for CoordinateName {
     }
 }
 
-/// A point of phase space: coordinates and their momenta p = ∂L/∂v.
+/// A point of phase space: coordinates and their momenta p = ∂L/∂v, in the units of the model. The method `state` that
+/// `#[dynamics]` gives a model makes one from coordinates and velocities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<const N: usize> {
     /// Generalized coordinates.

@@ -33,7 +33,12 @@ where
     /// such steps, and [`dense`](Self::dense) and [`transition`](Self::transition) are those of all pieces together.
     ///
     /// # Errors
-    /// [`StepError`]; `state` is unchanged then.
+    /// `state` is unchanged then. [`StepError::InvalidStep`] for a length that is zero or not finite;
+    /// [`StepError::NonFinite`], [`Legendre`](StepError::Legendre), [`SingularTangent`](StepError::SingularTangent),
+    /// [`NewtonStalled`](StepError::NewtonStalled) or [`FixedPointStalled`](StepError::FixedPointStalled) if the equations
+    /// are not solved even in pieces; [`Unproven`](StepError::Unproven) or [`EnergyJump`](StepError::EnergyJump) if the
+    /// solution may not be the motion; [`Slides`](StepError::Slides) or [`TooManyKinks`](StepError::TooManyKinks) at kinks;
+    /// [`Constraint`](StepError::Constraint) with constraints.
     pub fn advance(
         &mut self,
         t: f64,
