@@ -71,7 +71,7 @@ pub use subject::{PhasePoint, Subject};
 /// the reference:
 ///
 /// ```text
-/// error_q = |q − q_ref| / max |q_ref| ,   error_p = |p − p_ref| / max |p_ref|      (Euclidean norms; absolute where all q_ref are zero)
+/// error_q = |q − q_ref| / max |q_ref| ,   error_p = |p − p_ref| / max |p_ref|      (Euclidean norms; absolute where the maximum is zero)
 /// ```
 ///
 /// Times are those of the steps alone, on one processor, the best of several repetitions if a run is short. The

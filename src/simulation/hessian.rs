@@ -14,8 +14,8 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span and returns a loss with its [gradient](Self::gradient) and its matrix of second derivatives
     /// ∂²ℓ/∂θᵢ∂θⱼ with respect to the parameters θ named.
     ///
-    /// The second derivatives are differences of eighth order of gradients that are exact for the run; their error is
-    /// about 1e-11 of the change of the gradient. [`LossHessian::errors`] estimates it. Each parameter costs eight
+    /// The second derivatives are differences of eighth order of gradients that are exact for the run (T-158); their error
+    /// is about 1e-11 of the change of the gradient. [`LossHessian::errors`] estimates it. Each parameter costs eight
     /// gradients; sixteen or twenty-four if the loss is so curved that the differences have to be taken over shorter
     /// distances; and as many again if the loss does not depend on the magnitude of the parameter, because that is
     /// close to zero. (A least-squares [`Fit`](crate::Fit) needs first derivatives only.)
@@ -39,6 +39,7 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
     /// # Ok(())
     /// # }
     /// ```
+    ///
     /// # Errors
     /// As [`gradient`](Self::gradient). [`RunErrorKind::NoParameter`] if the model has no parameter of a given name,
     /// [`RunErrorKind::ParametersFixed`] if the model cannot be copied with other parameters.

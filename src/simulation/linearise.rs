@@ -22,7 +22,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the transition matrix of every element,
     ///
     /// ```text
-    /// Φ = ∂(p, q)ₖ₊₁ / ∂(p, q)ₖ ,     2N × 2N, ordered (p, q).
+    /// Φ = ∂(p, q)ₖ₊₁ / ∂(p, q)ₖ ,     2N × 2N, ordered (p, q)                                  (T-30)
     /// ```
     ///
     /// Use it for the linear stability of a motion and for the propagation of small changes of the start. There is an

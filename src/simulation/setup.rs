@@ -20,6 +20,16 @@ use tfe_runtime::{Element, Mixed, Model, Solve};
 /// without end, [`accuracy`](Self::accuracy) with a bound on the error, and others. The same simulation can be run
 /// many times.
 ///
+/// In each element the weak form of the equations of motion holds, such as for [`Mixed`], the default, with
+/// y = (p, q) and the right side f = (L_q + Q, v),
+///
+/// ```text
+/// ∫₀¹ y φ' dτ + h Σ_l b_l f_l φ(c_l) = y₁ φ(1) − y₀ φ(0)     for all polynomials φ of degree n − 1       (T-31)
+/// ```
+///
+/// with n nodes, and the points c_l and weights b_l of the element (`docs/theory.md` §2 and §6). The pages of the elements
+/// have their own forms, orders and stability.
+///
 /// All quantities are in consistent units: the time in the unit in which the model's parameters are given.
 ///
 /// ```
