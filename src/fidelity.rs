@@ -25,7 +25,7 @@ pub use ladder::{Choice, Ladder, Rung, RungPoint};
 /// Runs several models of one scene, and finds the cheapest that computes the scene's outputs with a given accuracy.
 ///
 /// The models are called rungs, the result a ladder. All models begin at the same start, expressed in the coordinates
-/// of each; they may differ in their coordinates and their kind of length. The last rung is taken as the truth.
+/// of each; they may differ in their coordinates and their kind of length. The last rung is the reference model.
 /// Compared are the outputs, `output(name) = …`, that all models declare:
 ///
 /// ```text
@@ -116,8 +116,8 @@ impl<'m> Fidelity<'m> {
         }
     }
 
-    /// Adds a model (a rung) with its start. The last one added is the truth with which the others are compared, and
-    /// is itself a candidate.
+    /// Adds a model (a rung) with its start. The last one added is the reference model, with which the others are
+    /// compared; it is itself a candidate.
     #[must_use]
     pub fn rung<M: Subject<S>, S: PhasePoint + 'm>(
         mut self,

@@ -15,7 +15,7 @@ pub struct Choice {
     /// The step size, in units of time, positive.
     pub step: f64,
     /// The largest relative error of the outputs, but not less than the [error of the model](Rung::model_error),
-    /// because a run that is nearer to the truth than its own model is so by chance, and not less than the uncertainty
+    /// because a run that is nearer to the reference than its own model is so by chance, and not less than the uncertainty
     /// of the reference.
     pub error: f64,
     /// The largest relative error of the outputs as computed.
@@ -87,7 +87,7 @@ impl Rung {
     /// The error of the model: that of its outputs when steps are so short that the discretisation error no longer
     /// matters.
     ///
-    /// `None` for the last model, which is the truth, and if the error of the model could not be distinguished from
+    /// `None` for the last model, which is the reference, and if the error of the model could not be distinguished from
     /// that of the steps: because it is below the smallest accuracy asked for, or no step was short enough.
     pub fn model_error(&self) -> Option<f64> {
         self.model_error
@@ -125,7 +125,7 @@ impl Ladder {
         &self.title
     }
 
-    /// All models in the order in which they were added; the last one is the truth.
+    /// All models in the order in which they were added; the last one is the reference model.
     pub fn rungs(&self) -> &[Rung] {
         &self.rungs
     }

@@ -48,7 +48,7 @@ pub struct UnstableInterval {
 ///
 /// A range may begin at zero, where a transition matrix is the identity: the matrix is not evaluated there.
 ///
-/// The cost is about a thousand evaluations of the matrix for one or two modes over a few bubbles, and tens of
+/// The cost is about a thousand evaluations of the matrix for one or two modes over a few unstable intervals, and tens of
 /// thousands for many modes that cross many times. More than 200 000 are an error.
 ///
 /// # Not guaranteed
