@@ -8,7 +8,7 @@ use crate::points::arrangement::Arrangement;
 use crate::points::first_order::Rows;
 use crate::points::inertia::Inertia;
 use crate::points::second_order::Forces;
-use crate::points::sweep::Largest;
+use crate::points::sweep::Magnitude;
 use crate::registers::pair::{Eight, LANES};
 use crate::registers::storage::{Fixed, Heap, Matrix};
 
@@ -22,7 +22,7 @@ pub(super) struct Trajectories<'a, M, V: Eight, const N: usize> {
 
 impl<M, V: Eight, const N: usize> Arrangement<V, LANES, N> for Trajectories<'_, M, V, N> {
     type Memory = Heap;
-    type Size = Largest<V>;
+    type Size = Magnitude<V>;
     type Number = [f64; LANES];
     type Entry = f64;
 

@@ -9,7 +9,6 @@ use super::second_order::{Forces, velocity_of};
 use super::{Leg, Row, Work};
 use crate::equations::Increment;
 use crate::model::{First, Model};
-#[cfg(feature = "alloc")]
 use crate::precise::Precise;
 use crate::registers::four::{Four, block, put};
 use crate::registers::storage::{Fixed, Matrix, Storage};
@@ -19,7 +18,7 @@ use crate::registers::storage::{Fixed, Matrix, Storage};
 #[derive(Clone, Copy)]
 pub(crate) struct Magnitude<V>(V);
 
-impl<V: Four> Size<V> for Magnitude<V> {
+impl<V: Precise> Size<V> for Magnitude<V> {
     #[inline(always)]
     fn none(like: V) -> Self {
         Self(like.like(0.0))
@@ -36,10 +35,20 @@ impl<V: Four> Size<V> for Magnitude<V> {
     }
 }
 
-impl<V: Four> Magnitude<V> {
+impl<V: Precise> Magnitude<V> {
+    /// One value for each lane.
+    #[cfg(feature = "alloc")]
+    #[inline(always)]
+    pub(crate) fn by_lane(self) -> V {
+        self.0
+    }
+
     /// The largest magnitudes of two, over all lanes.
     #[inline(always)]
-    fn of_both(one: Self, other: Self) -> (f64, f64) {
+    fn of_both(one: Self, other: Self) -> (f64, f64)
+    where
+        V: Four,
+    {
         let ([a, b, c, d], [e, f, g, h]) = (one.0.lanes(), other.0.lanes());
         let left = one.0.with([a, e, c, g]);
         let [a, e, c, g] = left.larger(left.with([b, f, d, h])).lanes();
@@ -80,19 +89,13 @@ impl<V: Precise> Size<V> for Largest<V> {
 
 #[cfg(feature = "alloc")]
 impl<V: Precise> Largest<V> {
-    /// One value for each lane; NaN where one value of that lane was not finite.
-    #[inline(always)]
-    pub(crate) fn by_lane(self) -> V {
-        self.size + self.sum * self.sum.like(0.0)
-    }
-
     /// The maximum of all lanes; NaN if one value was not finite.
     #[inline(always)]
     pub(crate) fn get(self) -> f64
     where
         V: Four,
     {
-        let [a, b, c, d] = self.by_lane().lanes();
+        let [a, b, c, d] = (self.size + self.sum * self.sum.like(0.0)).lanes();
         larger(larger(a, b), larger(c, d)) + 0.0 * ((a + b) + (c + d))
     }
 }
