@@ -1,6 +1,7 @@
 //! The interface that the velocity form and the phase-space form of the element equations share.
 
 use crate::error::StepError;
+use crate::legendre::larger;
 use crate::model::State;
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
@@ -137,7 +138,7 @@ impl<const N: usize> Span<'_, N> {
         let relative = if (velocity + position).is_nan() {
             f64::NAN
         } else {
-            velocity.max(position)
+            larger(velocity, position)
         };
         Increment { relative, position }
     }
@@ -178,19 +179,19 @@ pub(crate) fn moved<const N: usize>(
 pub(crate) fn relative(h: f64, start: &[f64], x: &[f64], step: &[f64]) -> f64 {
     let mut scale = 0.0_f64;
     for value in start {
-        scale = scale.max(value.abs());
+        scale = larger(scale, value.abs());
     }
     let (mut rate, mut increment, mut sum) = (0.0_f64, 0.0_f64, 0.0);
     for (value, step) in x.iter().zip(step) {
-        rate = rate.max(value.abs());
-        increment = increment.max(step.abs());
+        rate = larger(rate, value.abs());
+        increment = larger(increment, step.abs());
         // Maxima ignore a NaN; this sum does not, and turns infinities into one.
         sum += 0.0 * step;
     }
     if sum != 0.0 {
         return f64::NAN;
     }
-    let scale = scale.max(h.abs() * rate);
+    let scale = larger(scale, h.abs() * rate);
     if increment == 0.0 {
         0.0
     } else {

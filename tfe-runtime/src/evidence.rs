@@ -75,7 +75,9 @@ impl Evidence {
         if size > Self::FAR && increment.position > POSITION_ROUND_OFF {
             let curved = self.count == 1 && size > self.reach;
             let ratio = if curved { 1.0 } else { size / self.last };
-            self.ratio = self.ratio.max(ratio);
+            if self.ratio < ratio {
+                self.ratio = ratio;
+            }
         }
         self.last = if own { size } else { f64::INFINITY };
         self.count += u32::from(own);

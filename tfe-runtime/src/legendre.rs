@@ -501,6 +501,12 @@ fn distance<const N: usize>(x: &[f64; N], y: &[f64; N]) -> f64 {
     largest(&difference)
 }
 
+/// The larger of two numbers, in one instruction. If the second is NaN, it is the first.
+#[inline(always)]
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
+    if a < b { b } else { a }
+}
+
 /// The largest magnitude; NaN if one of the numbers is NaN.
 pub(crate) fn largest(values: &[f64]) -> f64 {
     let mut largest = 0.0_f64;
@@ -508,7 +514,7 @@ pub(crate) fn largest(values: &[f64]) -> f64 {
         if value.is_nan() {
             return f64::NAN;
         }
-        largest = largest.max(value.abs());
+        largest = larger(largest, value.abs());
     }
     largest
 }

@@ -114,8 +114,7 @@ pub(crate) struct Monitor {
     /// The smallest increment so far; `idle` counts the iterations since it was last halved.
     best: f64,
     idle: u32,
-    /// Whether increments are those relative to the size of each coordinate, and the last of these.
-    settles: bool,
+    /// The last increment relative to the size of each coordinate.
     own: f64,
 }
 
@@ -164,7 +163,6 @@ impl Monitor {
             noise: 0,
             best: f64::INFINITY,
             idle: 0,
-            settles: false,
             own: f64::INFINITY,
         }
     }
@@ -271,8 +269,9 @@ impl Monitor {
         })
     }
 
-    /// Judges an increment, and `own`, the same relative to the size of each coordinate, where one is small beside the
-    /// largest: once increments relative to the largest coordinate have converged, only these count.
+    /// Judges an increment, and, once increments relative to the largest coordinate have converged, what `own` computes: the
+    /// same relative to the size of each coordinate, where one is small beside the largest. From then on only these count,
+    /// which `settles` remembers: a local variable, so that models without small coordinates compile nothing of this.
     ///
     /// # Errors
     /// [`StepError::NonFinite`].
@@ -280,32 +279,26 @@ impl Monitor {
     pub(crate) fn judge_each(
         &mut self,
         increment: Increment,
-        own: Option<f64>,
+        settles: &mut bool,
+        own: impl FnOnce() -> Option<f64>,
     ) -> Result<Verdict, StepError> {
-        match own {
-            Some(own) => self.judge_own(increment, own),
-            None => self.judge(increment),
-        }
-    }
-
-    #[inline(never)]
-    fn judge_own(&mut self, increment: Increment, own: f64) -> Result<Verdict, StepError> {
-        if self.settles || matches!(self.judge(increment)?, Verdict::Converged) {
+        let verdict = match *settles {
+            true => Verdict::Converged,
+            false => self.judge(increment)?,
+        };
+        if matches!(verdict, Verdict::Converged)
+            && let Some(own) = own()
+        {
+            *settles = true;
             return self.settle(own);
         }
-        self.own = own;
-        Ok(Verdict::GoOn)
+        Ok(verdict)
     }
 
     /// Declares that from now on increments are those relative to the size of each coordinate.
     pub(crate) fn begin_to_settle(&mut self) {
         // Nothing is known of them yet.
-        (self.settles, self.last) = (true, 1.0);
-    }
-
-    /// Whether they are.
-    pub(crate) fn settles(&self) -> bool {
-        self.settles
+        self.last = 1.0;
     }
 
     /// Judges an increment relative to the size of each coordinate. Rounding errors of larger coordinates may keep it above
@@ -320,7 +313,7 @@ impl Monitor {
         const SHRINKS: f64 = 0.9;
 
         let before = core::mem::replace(&mut self.own, own);
-        (self.settles, self.last) = (true, own);
+        self.last = own;
         if !(own < f64::INFINITY) {
             return Err(StepError::NonFinite);
         }
@@ -354,7 +347,7 @@ impl Monitor {
     /// does not end the iteration.
     #[cfg(feature = "sparse")]
     pub(crate) fn is_noise(&mut self, fresh: bool) -> bool {
-        let idle = fresh && self.rate > 0.5 && self.last <= STIFF_ROUND_OFF && !self.settles;
+        let idle = fresh && self.rate > 0.5 && self.last <= STIFF_ROUND_OFF;
         self.noise = if idle { self.noise + 1 } else { 0 };
         self.noise >= 2
     }
@@ -418,7 +411,7 @@ where
     } else {
         control.max_iterations
     };
-    let (mut refresh, mut iterations) = (true, most);
+    let (mut refresh, mut settles, mut iterations) = (true, false, most);
     for iteration in 0..most {
         let Scratch { unknowns, step, .. } = scratch;
         equations.sweep(unknowns, step, refresh)?;
@@ -429,20 +422,19 @@ where
         statistics.iterations += 1;
         statistics.fixed_point_iterations += 1;
         let increment = equations.measure(unknowns, step);
-        let own_increment = (!control.is_rough())
-            .then(|| equations.measure_own(unknowns, step))
-            .flatten();
-        let verdict = monitor.judge_each(increment, own_increment)?;
+        let own_increment = || match control.is_rough() {
+            true => None,
+            false => equations.measure_own(unknowns, step),
+        };
+        let verdict = monitor.judge_each(increment, &mut settles, own_increment)?;
         equations.statistics().contraction = Contraction::of(monitor.rate());
         if let Verdict::Converged = verdict {
             return monitor.evidence(yielding).check(control.solve);
         }
         // The initial guess is accurate to a few digits, so that one evaluation of the mass matrices usually suffices.
         refresh = monitor.rate() > 0.1;
-        let is_hopeless = yielding
-            && iteration >= 2
-            && !monitor.settles()
-            && monitor.is_hopeless(most - iteration);
+        let is_hopeless =
+            yielding && iteration >= 2 && !settles && monitor.is_hopeless(most - iteration);
         if is_hopeless || monitor.is_stuck() {
             iterations = iteration + 1;
             break;
@@ -484,7 +476,7 @@ pub(crate) fn newton(
     // Factoring a small matrix is cheaper than the additional iterations that old factors would need.
     let known = beginning == Beginning::Known && (linear || scratch.unknowns.len() >= SMALL);
     let mut fresh = !known;
-    let (mut evidence, mut own) = (Evidence::of_newton(), false);
+    let (mut evidence, mut own, mut settles) = (Evidence::of_newton(), false, false);
     // Factoring a large matrix costs as much as many iterations with old factors.
     let is_large = scratch.unknowns.len() >= LARGE;
     let good_enough = if is_large { 0.3 } else { 0.05 };
@@ -526,10 +518,11 @@ pub(crate) fn newton(
         let increment = equations.measure(unknowns, step);
         own |= fresh;
         evidence.see(increment, own);
-        let own_increment = (!control.is_rough())
-            .then(|| equations.measure_own(unknowns, step))
-            .flatten();
-        let verdict = monitor.judge_each(increment, own_increment)?;
+        let own_increment = || match control.is_rough() {
+            true => None,
+            false => equations.measure_own(unknowns, step),
+        };
+        let verdict = monitor.judge_each(increment, &mut settles, own_increment)?;
         // Linear equations are solved once; a second solution removes the rounding error.
         let refined = linear && iteration > 0 && increment.relative <= ROUND_OFF;
         if refined || matches!(verdict, Verdict::Converged) || monitor.is_rounding(fresh) {

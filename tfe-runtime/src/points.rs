@@ -396,10 +396,13 @@ where
     (force, rate)
 }
 
-/// The largest magnitude.
+/// What sizes are at least, so that changes of zero are zero relative to them.
+const LEAST: f64 = f64::MIN_POSITIVE;
+
+/// The largest magnitude, or [`LEAST`].
 #[inline(always)]
 fn largest<const N: usize>(numbers: &[f64; N]) -> f64 {
-    let mut largest = 0.0;
+    let mut largest = LEAST;
     for a in 0..N {
         let size = numbers[a].abs();
         largest = if largest < size { size } else { largest };

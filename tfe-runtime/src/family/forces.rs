@@ -242,7 +242,7 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
         let mut monitor = Monitor::new(self.control.tolerance);
         let known = tangent.serves(h);
         let mut fresh = !known;
-        let (mut evidence, mut own) = (Evidence::of_newton(), false);
+        let (mut evidence, mut own, mut settles) = (Evidence::of_newton(), false, false);
         let scheme = self.table.view();
         let points = scheme.points();
         let mut outcome = Outcome {
@@ -277,15 +277,16 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
             self.statistics.newton_iterations += 1;
             own |= fresh;
             evidence.see(increment, own);
-            let own_step = (!self.control.is_rough())
-                .then(|| self.own_step(h, &tangent.rest))
-                .flatten();
-            let verdict = monitor.judge_each(increment, own_step);
+            let own_step = || match self.control.is_rough() {
+                true => None,
+                false => self.own_step(h, &tangent.rest),
+            };
+            let verdict = monitor.judge_each(increment, &mut settles, own_step);
             outcome.residual = monitor.last();
             outcome.contraction = monitor.rate();
             match verdict {
                 Ok(Verdict::Converged) => outcome.converged = true,
-                Ok(Verdict::GoOn) => outcome.converged = monitor.is_noise(fresh),
+                Ok(Verdict::GoOn) => outcome.converged = !settles && monitor.is_noise(fresh),
                 Err(error) => {
                     tangent.forget();
                     return Err(error);

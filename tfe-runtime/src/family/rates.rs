@@ -318,7 +318,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         let mut monitor = Monitor::new(control.tolerance);
         let known = self.matrix.is_factored() && self.factored == h;
         let mut fresh = !known;
-        let (mut evidence, mut own) = (Evidence::of_newton(), false);
+        let (mut evidence, mut own, mut settles) = (Evidence::of_newton(), false, false);
         let mut iterations = self.control.max_iterations;
         for iteration in 0..self.control.max_iterations {
             self.evaluate(t, h);
@@ -337,10 +337,13 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             let increment = self.measure(h);
             own |= fresh;
             evidence.see(increment, own);
-            let own_increment = (!control.is_rough()).then(|| self.measure_own(h)).flatten();
-            match monitor.judge_each(increment, own_increment) {
+            let own_increment = || match control.is_rough() {
+                true => None,
+                false => self.measure_own(h),
+            };
+            match monitor.judge_each(increment, &mut settles, own_increment) {
                 Ok(Verdict::Converged) => return evidence.check(self.control.solve),
-                Ok(Verdict::GoOn) if monitor.is_noise(fresh) => {
+                Ok(Verdict::GoOn) if !settles && monitor.is_noise(fresh) => {
                     return evidence.check(self.control.solve);
                 }
                 Ok(Verdict::GoOn) => {}

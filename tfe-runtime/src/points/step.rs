@@ -2,7 +2,6 @@
 
 use super::evaluation::{Evaluation, FEW, Placed};
 use super::forms::{acting, is_phase, is_second_order};
-use super::sweep::{LEAST, larger};
 use super::{Leg, Outcome, Points, Together, Work};
 use super::{is_finite, largest};
 use crate::error::StepError;
@@ -226,12 +225,12 @@ where
             },
             force_factors: [1.0; N],
         };
-        work.distance = larger(LEAST, largest(&leg.start.q));
+        work.distance = largest(&leg.start.q);
         if const { is_second_order::<M, N>() } {
             work.begin_second_order::<_, M>(like, &leg);
-            work.speed = larger(LEAST, largest(&work.velocity));
+            work.speed = largest(&work.velocity);
         } else {
-            work.speed = larger(LEAST, largest(&leg.start.p));
+            work.speed = largest(&leg.start.p);
         }
         let is_rough = control.is_rough();
         let mut monitor = Monitor::of_fixed_point(control.tolerance);

@@ -6,8 +6,9 @@ use super::first_order::Rows;
 use super::forms::acting;
 use super::inertia::Inertia;
 use super::second_order::{Forces, velocity_of};
-use super::{Leg, Row, Work};
+use super::{LEAST, Leg, Row, Work};
 use crate::equations::Increment;
+use crate::legendre::larger;
 use crate::model::{First, Model};
 use crate::precise::Precise;
 use crate::registers::four::{Four, block, put};
@@ -99,15 +100,6 @@ impl<V: Precise> Largest<V> {
         larger(larger(a, b), larger(c, d)) + 0.0 * ((a + b) + (c + d))
     }
 }
-
-/// The larger of two numbers, in one instruction; neither may be NaN.
-#[inline(always)]
-pub(crate) fn larger(a: f64, b: f64) -> f64 {
-    if a < b { b } else { a }
-}
-
-/// What sizes are at least, so that changes of zero are zero relative to them.
-pub(super) const LEAST: f64 = f64::MIN_POSITIVE;
 
 /// |h δ| divided by the larger of `start`, which is not zero, and |h x|.
 #[inline(always)]

@@ -1,8 +1,8 @@
 //! The weights of increments in an iteration that has converged relative to the largest coordinate.
 
 use super::forms::{is_phase, is_second_order};
-use super::sweep::larger;
 use super::{Leg, Work};
+use crate::legendre::larger;
 use crate::model::Model;
 use crate::precise::Precise;
 use crate::registers::storage::{Row, Storage};
