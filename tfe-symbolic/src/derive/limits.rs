@@ -139,28 +139,72 @@ fn is_derivative(array: Array) -> bool {
     )
 }
 
-/// A derivative f″(|x|) sign²x of a function of |x|, with one for the square of the sign, which it is on both sides of zero.
+/// A derivative f″(|x|) sign²x of a function of |x|, with one for the square of the sign, which it is on both sides of zero; and
+/// a sign x + b sign²x for sign x (a + b sign x), as backward sweeps leave it.
 fn without_squares_of_signs(graph: &mut Graph, x: ExprId) -> ExprId {
     let mut factors = factors_of(graph, x);
     let mut is_changed = false;
     for (y, n) in &mut factors {
-        let is_sign = matches!(
-            graph.node(*y),
-            Node::Call {
-                function: Function::Sign,
-                ..
-            }
-        );
-        if is_sign && *n > 1 {
+        if is_sign(graph, *y) && *n > 1 {
             *n %= 2;
             is_changed = true;
         }
     }
-    if !is_changed {
-        return x;
-    }
     let coefficient = graph.as_multiple(x).0;
-    graph.product(coefficient, &factors)
+    if let Some(sum) = sign_and_sum(graph, &factors) {
+        return times_sum(graph, coefficient, &factors, sum);
+    }
+    match is_changed {
+        true => graph.product(coefficient, &factors),
+        false => x,
+    }
+}
+
+fn is_sign(graph: &Graph, x: ExprId) -> bool {
+    matches!(
+        graph.node(x),
+        Node::Call {
+            function: Function::Sign,
+            ..
+        }
+    )
+}
+
+/// A sum among factors of which a term has a sign that is another factor.
+fn sign_and_sum(graph: &Graph, factors: &[(ExprId, i32)]) -> Option<ExprId> {
+    let signs = factors
+        .iter()
+        .filter(|(y, n)| *n == 1 && is_sign(graph, *y));
+    let signs: Vec<ExprId> = signs.map(|(y, _)| *y).collect();
+    let holds = |term: ExprId| {
+        let mut own = factors_of(graph, term).into_iter();
+        own.any(|(y, n)| n > 0 && signs.contains(&y))
+    };
+    let mut sums = factors.iter().filter(|(_, n)| *n == 1);
+    let sum = sums.find(|(y, _)| {
+        let terms = graph.as_sum(*y).map_or(&[][..], |(_, terms)| terms);
+        terms.iter().any(|(_, term)| holds(*term))
+    })?;
+    Some(sum.0)
+}
+
+/// The sum of the products of other factors with the terms of a sum among them, without squares of signs.
+fn times_sum(
+    graph: &mut Graph,
+    coefficient: Constant,
+    factors: &[(ExprId, i32)],
+    sum: ExprId,
+) -> ExprId {
+    let mut others = factors.to_vec();
+    others.retain(|(y, _)| *y != sum);
+    let rest = graph.product(coefficient, &others);
+    let (constant, terms) = graph.terms(sum);
+    let mut products = vec![(constant, rest)];
+    for (c, term) in terms {
+        let product = graph.multiply(rest, term);
+        products.push((c, without_squares_of_signs(graph, product)));
+    }
+    graph.linear(Constant::ZERO, &products)
 }
 
 /// A choice between a value and zero.

@@ -10,6 +10,7 @@ mod counts;
 mod derivatives;
 mod families;
 mod kept_digits;
+mod kinks;
 mod limits;
 mod lists;
 mod loops;

@@ -4,7 +4,7 @@
 use crate::kernels::results_of;
 use tfe_symbolic::program::Request;
 
-const ALL: Request = Request {
+pub const ALL: Request = Request {
     value: true,
     first: true,
     mass: true,
@@ -17,7 +17,7 @@ const ALL: Request = Request {
 
 /// Up to some hundred roundings: sums cancel little where these are evaluated.
 #[track_caller]
-fn close(found: f64, expected: f64, what: &str) {
+pub fn close(found: f64, expected: f64, what: &str) {
     assert!(
         (found - expected).abs() <= 1e-13 * expected.abs(),
         "{what}: {found}, {expected}"
@@ -26,7 +26,7 @@ fn close(found: f64, expected: f64, what: &str) {
 
 /// Value, first and second derivative of a potential of one coordinate, as many as are given.
 #[track_caller]
-fn check(energy: &str, parameters: &[(&str, f64)], x: f64, expected: &[f64]) {
+pub fn check(energy: &str, parameters: &[(&str, f64)], x: f64, expected: &[f64]) {
     let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - ({energy})");
     let found = results_of(&text, parameters, ALL, &[x], &[0.0]);
     let found = [-found.value, -found.q[0], -found.qq[0][0]];
@@ -247,102 +247,6 @@ fn smooth_functions_of_absolute_values() {
     let found = results_of(text, &[], ALL, &[0.0], &[0.0]);
     // The square of a sign that is declared is zero at zero.
     assert_eq!((found.force[0], found.force_z[0][0]), (0.0, -0.5));
-}
-
-/// Products of functions with kinks at the same place: |x| |sin x| is x sin x near zero. Signs are zero there, and so were products of two.
-#[test]
-fn kinks_that_make_a_smooth_product() {
-    for (energy, second) in [
-        ("abs(x)*abs(sin(x))", 2.0),
-        ("abs(x)*tanh(abs(x))", 2.0),
-        ("abs(x)*abs(2*x)", 4.0),
-        ("abs(x)*sqrt(x^2)", 2.0),
-        ("hypot(x, 0)*abs(x)", 2.0),
-        ("abs(sin(x))^2", 2.0),
-        ("abs(x)*abs(x)*cos(x)", 2.0),
-        ("abs(x)*min(x, -x)", -2.0),
-        ("abs(x)*select(x > 0, x, -x)", 2.0),
-        ("select(x > 0, x, -x)*select(x < 0, -x, x)", 2.0),
-        ("max(x, 0)*min(x, 0)", 0.0),
-        ("max(x, 0)*max(-sin(x), 0)", 0.0),
-        ("(abs(x) + x)*(abs(x) - x)", 0.0),
-        ("abs(sin(x))*abs(sin(2*x))", 4.0),
-        ("abs(x)*abs(sin(abs(x)))", 2.0),
-        ("abs(x)*abs(x + x^3)", 2.0),
-        ("abs(x)*(1 - exp(-abs(x)))", 2.0),
-    ] {
-        check(energy, &[], 0.0, &[0.0, 0.0, second]);
-    }
-    // Inside other functions.
-    for (energy, value, second) in [
-        ("cos(abs(x) + sinh(abs(x)))", 1.0, -4.0),
-        ("cos(abs(x) + sin(x)^2)", 1.0, -1.0),
-        ("sqrt(1 + abs(x)*abs(sin(x)))", 1.0, 1.0),
-        ("exp(-abs(x)*abs(tanh(x)))", 1.0, -2.0),
-    ] {
-        check(energy, &[], 0.0, &[value, 0.0, second]);
-    }
-    check("abs(x - 1)*abs(x^2 - 1)", &[], 1.0, &[0.0, 0.0, 4.0]);
-    check("abs(x)*abs(c*x)", &[("c", -3.0)], 0.0, &[0.0, 0.0, 6.0]);
-    check(
-        "abs(x - c)*tanh(abs(x - c))",
-        &[("c", 3.0)],
-        3.0,
-        &[0.0, 0.0, 2.0],
-    );
-    let (s, c) = 0.3_f64.sin_cos();
-    for x in [0.3_f64, -0.3] {
-        let expected = [0.3 * s, x.signum() * (s + 0.3 * c), 2.0 * c - 0.3 * s];
-        check("abs(x)*abs(sin(x))", &[], x, &expected);
-    }
-}
-
-/// Where both sides differ nothing is changed: the sign of zero is zero, and of equal arguments `max` takes the first.
-#[test]
-fn jumps_of_the_curvature_stay() {
-    for (energy, second) in [
-        ("abs(x)*abs(x - 1)", 0.0),
-        ("(abs(x) + x)^2", 4.0),
-        ("abs(x)*(abs(sin(x)) + x)", 0.0),
-        ("max(x, 0)*max(sin(x), 0)", 2.0),
-    ] {
-        let text = format!("coordinates(x), lagrangian = dot(x)^2/2 - {energy}");
-        let found = results_of(&text, &[], ALL, &[0.0], &[0.0]);
-        assert_eq!(-found.qq[0][0], second, "{energy}");
-    }
-}
-
-/// The same of differences of coordinates, of a dissipation, and of an energy that is differentiated backward, as large ones are.
-#[test]
-fn kinks_of_several_coordinates_that_make_a_smooth_product() {
-    for energy in ["abs(x - y)*tanh(abs(x - y))", "abs(x - y)*abs(sin(x - y))"] {
-        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
-        let found = results_of(&text, &[], ALL, &[2.0; 2], &[0.0; 2]);
-        assert_eq!(found.q, [0.0; 2], "{energy}");
-        assert_eq!(found.qq.concat(), [-2.0, 2.0, 2.0, -2.0], "{energy}");
-    }
-    let text = "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - abs(x*y)*abs(x)";
-    let found = results_of(text, &[], ALL, &[0.0, -3.0], &[0.0; 2]);
-    assert_eq!(found.qq.concat(), [-6.0, 0.0, 0.0, 0.0]);
-    let text = "coordinates(x), lagrangian = dot(x)^2/2, dissipation = mu*abs(dot(x))*tanh(abs(dot(x))/eps)";
-    let parameters = [("mu", 0.6), ("eps", 0.125)];
-    let found = results_of(text, &parameters, ALL, &[0.0], &[0.0]);
-    assert_eq!((found.force[0], found.force_z[0][0]), (0.0, -9.6));
-    const COUNT: usize = 20;
-    let names: Vec<String> = (0..COUNT).map(|k| format!("x{k}")).collect();
-    let terms = names
-        .iter()
-        .map(|x| format!("dot({x})^2/2 - abs({x})*tanh(abs({x}))"));
-    let terms: Vec<String> = terms.collect();
-    let text = format!(
-        "coordinates({}), lagrangian = {}",
-        names.join(", "),
-        terms.join(" + ")
-    );
-    let found = results_of(&text, &[], ALL, &[0.0; COUNT], &[0.0; COUNT]);
-    for k in 0..COUNT {
-        assert_eq!((found.q[k], found.qq[k][k]), (0.0, -2.0), "{k}");
-    }
 }
 
 /// Roots of x⁴ + x⁶ = x⁴ (1 + x²), of 1 − cos x = 2 sin²(x/2) and of cosh x − 1 = 2 sinh²(x/2).

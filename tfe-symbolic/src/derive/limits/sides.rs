@@ -64,34 +64,106 @@ impl Sides {
     }
 
     fn new_limit(&mut self, graph: &mut Graph, x: ExprId) -> Option<ExprId> {
-        if graph.contains_sum(x) {
-            return None;
-        }
-        let (number, terms) = graph.terms(x);
-        let (jumping, mut others): (Vec<_>, Vec<_>) = terms
-            .into_iter()
-            .partition(|(_, term)| jumps(graph, *term, MAX_SUMS) > 0);
-        let mut times = jumping
-            .iter()
-            .map(|(_, term)| jumps(graph, *term, MAX_SUMS));
-        if !times.any(|times| times > 1) {
+        let (_, terms) = graph.terms(x);
+        let mut times = terms.iter().map(|(_, term)| jumps(graph, *term, MAX_SUMS));
+        if graph.contains_sum(x) || !times.any(|times| times > 1) {
             return None;
         }
         let trial = self.trial.get_or_insert_with(|| graph.clone());
-        let sum = trial.linear(Constant::ZERO, &jumping);
-        if limits_at_kinks(trial, sum).is_empty() {
-            return None;
-        }
-        let sum = graph.linear(Constant::ZERO, &jumping);
-        let zero = graph.constant(Constant::ZERO);
-        let mut value = sum;
-        for (kink, limit) in limits_at_kinks(graph, sum) {
-            let size = graph.call(Function::Abs, &[kink]);
-            value = graph.select(Comparison::LessOrEqual, size, zero, limit, value);
-        }
-        others.push((Constant::ONE, value));
-        Some(graph.linear(number, &others))
+        with_limits(trial, x)?;
+        with_limits(graph, x)
     }
+}
+
+/// A term of a sum with its coefficient.
+type Term = (Constant, ExprId);
+
+/// Terms whose limit is not known.
+#[derive(Clone, Copy, PartialEq)]
+enum Unknown {
+    /// With one of them there is no limit.
+    Refused,
+    /// They stay as they are beside the limit of the others.
+    Kept,
+}
+
+/// A sum with the limits of its jumping terms; `None` where there are none. Where the limits of some terms are not known, those of the
+/// others are taken with sums in products multiplied out, so that no term is a product with both.
+fn with_limits(graph: &mut Graph, x: ExprId) -> Option<ExprId> {
+    let (number, terms) = graph.terms(x);
+    if let Some(value) = with_limits_of_terms(graph, number, &terms, Unknown::Refused) {
+        return Some(value);
+    }
+    let opened = opened(graph, &terms, MAX_SUMS);
+    with_limits_of_terms(graph, number, &opened, Unknown::Kept)
+}
+
+fn with_limits_of_terms(
+    graph: &mut Graph,
+    number: Constant,
+    terms: &[Term],
+    unknown: Unknown,
+) -> Option<ExprId> {
+    let (jumping, mut others): (Vec<Term>, Vec<Term>) = terms
+        .iter()
+        .copied()
+        .partition(|(_, term)| jumps(graph, *term, MAX_SUMS) > 0);
+    let limits = limits_at_kinks(graph, &jumping, unknown);
+    if limits.is_empty() {
+        return None;
+    }
+    let zero = graph.constant(Constant::ZERO);
+    let mut value = graph.linear(Constant::ZERO, &jumping);
+    for (size, limit) in limits {
+        value = graph.select(Comparison::LessOrEqual, size, zero, limit, value);
+    }
+    others.push((Constant::ONE, value));
+    Some(graph.linear(number, &others))
+}
+
+/// The terms with their products with jumping sums multiplied out, to at most [`MAX_TERMS`].
+fn opened(graph: &mut Graph, terms: &[Term], depth: usize) -> Vec<Term> {
+    let Some(depth) = depth.checked_sub(1) else {
+        return terms.to_vec();
+    };
+    let mut all = Vec::with_capacity(terms.len());
+    for (c, term) in terms {
+        let parts = multiplied_out(graph, *term).unwrap_or_default();
+        if parts.is_empty() || parts.len() > MAX_TERMS {
+            all.push((*c, *term));
+            continue;
+        }
+        let parts: Vec<Term> = parts.into_iter().map(|(d, y)| (*c * d, y)).collect();
+        all.extend(opened(graph, &parts, depth));
+    }
+    match all.len() <= MAX_TERMS {
+        true => all,
+        false => terms.to_vec(),
+    }
+}
+
+/// A product with a sum that jumps, as the sum of its products.
+fn multiplied_out(graph: &mut Graph, term: ExprId) -> Option<Vec<Term>> {
+    let mut factors = factors_of(graph, term);
+    let jumps_as_sum = |(y, n): &(ExprId, i32)| {
+        *n == 1 && graph.as_sum(*y).is_some() && jumps(graph, *y, MAX_SUMS) > 0
+    };
+    let at = factors.iter().position(jumps_as_sum)?;
+    let (sum, _) = factors.swap_remove(at);
+    let number = graph.as_multiple(term).0;
+    let rest = graph.product(number, &factors);
+    let (constant, terms) = graph.terms(sum);
+    let (own, y) = graph.as_multiple(rest);
+    let mut products = Vec::with_capacity(terms.len() + 1);
+    if !constant.is_zero() {
+        products.push((constant * own, y));
+    }
+    for (c, y) in terms {
+        let product = graph.multiply(rest, y);
+        let (own, product) = graph.as_multiple(product);
+        products.push((c * own, product));
+    }
+    Some(products)
 }
 
 /// The number of jumps that are multiplied with each other in a term.
@@ -123,18 +195,36 @@ fn is_jump(node: &Node) -> bool {
     )
 }
 
-/// Quantities that may vanish, and the limits of a sum where they do, as far as it has these from both sides and is not
-/// evaluated to them.
-fn limits_at_kinks(graph: &mut Graph, sum: ExprId) -> Vec<(ExprId, ExprId)> {
-    let mut kinks = Vec::new();
-    for (_, term) in graph.terms(sum).1 {
-        add_kinks(graph, term, MAX_SUMS, &mut kinks);
+/// Sizes of quantities that may vanish, and the limits of a sum of jumping terms where they do, as far as it has these from both sides and is
+/// not evaluated to them.
+fn limits_at_kinks(graph: &mut Graph, terms: &[Term], unknown: Unknown) -> Vec<(ExprId, ExprId)> {
+    let (mut kinks, mut pairs) = (Vec::new(), Vec::new());
+    for (_, term) in terms {
+        let mut own = Vec::new();
+        add_kinks(graph, *term, MAX_SUMS, &mut own);
+        own.truncate(MAX_KINKS);
+        for (at, kink) in own.iter().enumerate() {
+            pairs.extend(own[..at].iter().map(|other| [*other, *kink]));
+        }
+        let new = own.into_iter().filter(|kink| !kinks.contains(kink));
+        let new: Vec<ExprId> = new.collect();
+        kinks.extend(new);
     }
     kinks.truncate(MAX_KINKS);
     let mut found = Vec::with_capacity(kinks.len());
-    for kink in kinks {
-        if let Some(limit) = limit_at(graph, sum, kink) {
-            found.push((kink, limit));
+    for kink in &kinks {
+        if let Some(limit) = limit_at(graph, terms, (*kink, unknown)) {
+            let size = graph.call(Function::Abs, &[*kink]);
+            found.push((size, limit));
+        }
+    }
+    pairs.retain(|pair| pair.iter().all(|kink| kinks.contains(kink)));
+    pairs.sort_unstable();
+    pairs.dedup();
+    for pair in pairs {
+        if let Some(limit) = limit_at_pair(graph, terms, (pair, unknown)) {
+            let sizes = pair.map(|kink| (Constant::ONE, graph.call(Function::Abs, &[kink])));
+            found.push((graph.linear(Constant::ZERO, &sizes), limit));
         }
     }
     found
@@ -222,19 +312,79 @@ fn linear_term(graph: &Graph, sum: ExprId) -> Option<usize> {
     })
 }
 
-/// The limit of a sum where a quantity vanishes, if it has one from both sides and is not evaluated to that.
-fn limit_at(graph: &mut Graph, sum: ExprId, kink: ExprId) -> Option<ExprId> {
-    let (sum, leaf) = in_terms_of(graph, sum, kink);
-    let from = |graph: &mut Graph, side: i64| {
-        let mut approach = Approach {
-            leaf: &leaf,
-            side,
-            slopes: Map::default(),
-        };
-        approach.limit(graph, sum, MAX_DEPTH)
+/// The limit of a sum of terms where a quantity vanishes, if it has one from both sides and is not evaluated to that.
+fn limit_at(
+    graph: &mut Graph,
+    terms: &[Term],
+    (kink, unknown): (ExprId, Unknown),
+) -> Option<ExprId> {
+    let (mut of_kink, mut leaf) = (Vec::with_capacity(terms.len()), None);
+    for (c, term) in terms {
+        let (term, own) = in_terms_of(graph, *term, kink);
+        of_kink.push((*c, term));
+        leaf = Some(own);
+    }
+    let leaf = leaf?;
+    let zero = graph.input(leaf.clone());
+    limit_from_both_sides(graph, (terms, unknown), &of_kink, (&leaf, &[zero]))
+}
+
+/// The same where two quantities of one variable do, which none of them does with the other for all values of parameters: x − a and x − b,
+/// or x² − 1 and x⁴ − 1.
+fn limit_at_pair(
+    graph: &mut Graph,
+    terms: &[Term],
+    (pair, unknown): ([ExprId; 2], Unknown),
+) -> Option<ExprId> {
+    let variables = |graph: &Graph, kink: ExprId| {
+        let mut inputs = graph.inputs_of(kink);
+        inputs.retain(|input| !is_at_rest(input));
+        inputs
     };
-    let above = from(graph, 1)?;
-    let below = from(graph, -1)?;
+    let [of_first, of_second] = pair.map(|kink| variables(graph, kink));
+    let [leaf] = &of_first[..] else {
+        return None;
+    };
+    let [first, second] = pair;
+    let is_one = of_first == of_second;
+    if !is_one || is_known_at(graph, first, second) || is_known_at(graph, second, first) {
+        return None;
+    }
+    limit_from_both_sides(graph, (terms, unknown), terms, (leaf, &pair))
+}
+
+/// Whether a quantity has a number as its value where another one vanishes.
+fn is_known_at(graph: &mut Graph, x: ExprId, kink: ExprId) -> bool {
+    let (x, leaf) = in_terms_of(graph, x, kink);
+    let zeros = [graph.input(leaf.clone())];
+    let mut approach = Approach::of(&leaf, &zeros, 0);
+    let limit = approach.limit(graph, x, MAX_DEPTH);
+    limit.is_none_or(|limit| graph.as_constant(limit).is_some())
+}
+
+/// The limit of a sum of terms, given also as expressions of a leaf, where some quantities vanish together.
+fn limit_from_both_sides(
+    graph: &mut Graph,
+    (terms, unknown): (&[Term], Unknown),
+    of_leaf: &[Term],
+    (leaf, zeros): (&Input, &[ExprId]),
+) -> Option<ExprId> {
+    let [above, below, at_zero] = [1, -1, 0].map(|side| {
+        let mut approach = Approach::of(leaf, zeros, side);
+        let limit = |(c, term): &Term| Some((*c, approach.limit(graph, *term, MAX_DEPTH)?));
+        of_leaf.iter().map(limit).collect::<Vec<_>>()
+    });
+    let is_known = |at: usize| above[at].is_some() && below[at].is_some();
+    let (known, others): (Vec<usize>, Vec<usize>) = (0..terms.len()).partition(|at| is_known(*at));
+    if unknown == Unknown::Refused && !others.is_empty() {
+        return None;
+    }
+    let mut sum = |limits: &[Option<Term>]| {
+        let limits = known.iter().map(|at| limits[*at]);
+        let limits = limits.collect::<Option<Vec<Term>>>()?;
+        Some(graph.linear(Constant::ZERO, &limits))
+    };
+    let (above, below, at_zero) = (sum(&above)?, sum(&below)?, sum(&at_zero));
     if above != below {
         let difference = graph.subtract(above, below);
         let difference = graph.expanded_within(difference, MAX_TERMS)?;
@@ -242,7 +392,12 @@ fn limit_at(graph: &mut Graph, sum: ExprId, kink: ExprId) -> Option<ExprId> {
             return None;
         }
     }
-    (from(graph, 0) != Some(above)).then_some(above)
+    if at_zero == Some(above) {
+        return None;
+    }
+    let mut limit: Vec<Term> = others.into_iter().map(|at| terms[at]).collect();
+    limit.push((Constant::ONE, above));
+    Some(graph.linear(Constant::ZERO, &limit))
 }
 
 /// An expression as one of a quantity that may vanish, and the leaf that is the quantity in it.
@@ -272,16 +427,27 @@ fn solution(graph: &mut Graph, sum: ExprId, value: ExprId) -> Option<(ExprId, Ex
     Some((input, graph.scale(c.reciprocal()?, difference)))
 }
 
-/// How a leaf approaches zero.
+/// How quantities approach zero as a leaf changes.
 struct Approach<'a> {
     leaf: &'a Input,
+    /// What vanishes: the leaf itself, or expressions of it.
+    zeros: &'a [ExprId],
     /// 1 from above, −1 from below, and 0 at zero itself.
     side: i64,
     /// The slopes found so far; `None` for those that vanish or are not known.
     slopes: Map<ExprId, Option<ExprId>>,
 }
 
-impl Approach<'_> {
+impl<'a> Approach<'a> {
+    fn of(leaf: &'a Input, zeros: &'a [ExprId], side: i64) -> Self {
+        Self {
+            leaf,
+            zeros,
+            side,
+            slopes: Map::default(),
+        }
+    }
+
     /// The limit of an expression without jumps but those at zero; `None` where it is not known.
     fn limit(&mut self, graph: &mut Graph, x: ExprId, depth: usize) -> Option<ExprId> {
         let depth = depth.checked_sub(1)?;
@@ -289,7 +455,7 @@ impl Approach<'_> {
         for old in graph.reachable(&[x]) {
             let node = graph.node(old).clone();
             let new = match &node {
-                Node::Input(input) if input == self.leaf => graph.constant(Constant::ZERO),
+                _ if self.zeros.contains(&old) => graph.constant(Constant::ZERO),
                 node if mapping.keeps(node) => continue,
                 node => self.limit_of_node(graph, node, &mapping, depth)?,
             };
