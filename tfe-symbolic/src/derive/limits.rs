@@ -8,7 +8,7 @@
 //! ```
 //!
 //! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
-//! are treated in `norms.rs`, exponents in `exponents.rs`, exponentials in `exponentials.rs`, sums whose terms have a
+//! are treated in `norms.rs`, exponents in `exponents.rs`, exponentials in `exponentials.rs`, inverse functions in `inverse.rs`, sums whose terms have a
 //! limit only together in `together.rs`, and products of signs and choices that jump at the same place in `sides.rs`. This is done to the entries as a last step, after factors have been combined, so
 //! that m/√m is √m and no choice is needed. Energies and outputs have the limits of norms and of quotients of exponentials
 //! only.
@@ -17,6 +17,7 @@ mod exponentials;
 mod exponents;
 mod facts;
 mod forms;
+mod inverse;
 mod norm;
 mod norms;
 mod powers;
@@ -33,6 +34,7 @@ use crate::program::Array;
 use exponentials::{logarithm_where_infinite, over_exponentials, where_exponentials_vanish};
 use exponents::{where_exponents_vanish, with_quotients_merged};
 use facts::{factors_of, is_surely_positive, is_zero};
+use inverse::inverse_functions_over_roots;
 use norms::Norms;
 use sides::take_limits_from_both_sides;
 use together::Together;
@@ -75,6 +77,7 @@ pub(crate) fn take_limits<'a>(
         let product = with_quotients_merged(graph, new);
         let product = norms.limit(graph, product);
         let product = over_exponentials(graph, product);
+        let product = inverse_functions_over_roots(graph, product);
         let product = inside_choices(graph, product);
         let product = where_exponents_vanish(graph, product);
         where_exponentials_vanish(graph, product)

@@ -249,6 +249,30 @@ fn smooth_functions_of_absolute_values() {
     assert_eq!((found.force[0], found.force_z[0][0]), (0.0, -0.5));
 }
 
+/// acos² x = 2 (1 − x) + …, acosh² x = 2 (x − 1) + … at x = 1, where the functions themselves are vertical.
+#[test]
+fn slopes_of_squared_inverse_functions_at_their_ends() {
+    for (energy, x, first) in [
+        ("acos(x)^2", 1.0, -2.0),
+        ("acosh(x)^2", 1.0, 2.0),
+        ("acos(x/2)^2", 2.0, -1.0),
+        ("x*acos(x)^2", 1.0, -2.0),
+        ("acos(x)^4", 1.0, 0.0),
+    ] {
+        check(energy, &[], x, &[0.0, first]);
+    }
+    let (angle, root) = (0.5_f64.acos(), 0.75_f64.sqrt());
+    let second = 2.0 / 0.75 - angle / (0.75 * root);
+    let expected = [angle * angle, -2.0 * angle / root, second];
+    check("acos(x)^2", &[], 0.5, &expected);
+    // At the other end the slope is infinite, and beyond the ends there is none.
+    let text = "coordinates(x), lagrangian = dot(x)^2/2 - acos(x)^2";
+    let found = results_of(text, &[], ALL, &[-1.0], &[0.0]);
+    assert_eq!(found.q[0], f64::INFINITY);
+    let found = results_of(text, &[], ALL, &[1.5], &[0.0]);
+    assert!(found.q[0].is_nan());
+}
+
 /// Roots of x⁴ + x⁶ = x⁴ (1 + x²), of 1 − cos x = 2 sin²(x/2) and of cosh x − 1 = 2 sinh²(x/2).
 #[test]
 fn roots_of_even_powers_at_zero() {
