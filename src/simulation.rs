@@ -28,7 +28,7 @@ mod section;
 mod sensitive;
 mod setup;
 mod steps;
-mod times;
+pub(crate) mod times;
 mod trail;
 mod watch;
 

@@ -11,6 +11,7 @@ use crate::motion::{Node, default_step};
 use crate::progress::Progress;
 use crate::simulation::Watching;
 use crate::simulation::mesh::Mesh;
+use crate::simulation::times::looks_at_ends;
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Mutex;
@@ -302,7 +303,8 @@ where
     ) -> Result<Statistics, EnsembleError> {
         let count = self.models.count(starts.len())?;
         let step = self.step_over(&span);
-        let mesh = Mesh::new(&span, step, &self.breaks, &[])?;
+        let at_ends = looks_at_ends(self.element, !M::CONSTRAINTS.is_empty());
+        let mesh = Mesh::new(&span, step, &self.breaks, &[])?.whole_unless(at_ends);
         self.element.validate().map_err(RunErrorKind::Element)?;
         let plan = Plan {
             element: self.element,

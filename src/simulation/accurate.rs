@@ -59,7 +59,7 @@ fn compared(run: &dyn Repeatable, mesh: &Times, times: &[f64]) -> Result<Trace, 
     let mut stepper = run.stepper(Element::mixed(element.nodes()), control, false)?;
     let mesh = match times.is_empty() {
         true => mesh.clone(),
-        false => given.through(&nodes)?,
+        false => given.through(given.element, &nodes)?,
     };
     follow(run, &mut *stepper, &mesh, times).map_err(|stop| stop.0)
 }

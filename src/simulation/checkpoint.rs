@@ -151,7 +151,7 @@ where
                     breaks: &self.breaks,
                     impulses: &impulses,
                 };
-                M::mesh(span, &grid)
+                Ok(M::mesh(span, &grid)?.whole_unless(self.looks_at_ends()))
             };
             let nodes = self.nodes.as_deref();
             let place = checkpoint.reached.place(end, nodes, &mesh)?;

@@ -78,6 +78,14 @@ impl<const N: usize> Mesh<N> {
         })
     }
 
+    /// The same elements, whole if nothing looks at their ends; see [`looks_at_ends`](super::times::looks_at_ends).
+    pub(crate) fn whole_unless(self, at_ends: bool) -> Self {
+        Self {
+            times: self.times.whole_unless(at_ends),
+            ..self
+        }
+    }
+
     /// The step size, if the steps are equal; elements that end at breaks may be shorter.
     pub(crate) fn step(&self) -> Option<f64> {
         self.step

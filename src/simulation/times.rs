@@ -6,6 +6,7 @@ use crate::motion::{
     leads_to_end, sort_times,
 };
 use std::ops::Range;
+use tfe_runtime::{Element, Family, Rule};
 
 /// A time interval divided into equal steps; the last one may be shorter.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,6 +142,15 @@ impl Times {
         })
     }
 
+    /// The same elements, whole if nothing looks at their ends; see [`looks_at_ends`].
+    pub(super) fn whole_unless(mut self, at_ends: bool) -> Self {
+        if !at_ends {
+            self.segments.iter_mut().for_each(Segment::forget_breaks);
+            self.has_breaks = false;
+        }
+        self
+    }
+
     /// The end of the last element.
     pub(super) fn end(&self) -> Option<f64> {
         self.segments.last().map(|segment| segment.end)
@@ -270,6 +280,14 @@ impl Endless {
         })
     }
 
+    /// The same elements, whole if nothing looks at their ends; see [`looks_at_ends`].
+    pub(crate) fn whole_unless(mut self, at_ends: bool) -> Self {
+        if !at_ends {
+            self.segments.iter_mut().for_each(Segment::forget_breaks);
+        }
+        self
+    }
+
     /// Start, end and length of the next element, and the time at which the force is first evaluated in it.
     pub(crate) fn element(&self) -> (f64, f64, f64, f64) {
         let (segment, k) = (&self.segments[self.segment], self.done);
@@ -289,6 +307,15 @@ impl Endless {
             (self.segment, self.done) = (self.segment + 1, 0);
         }
     }
+}
+
+/// Whether forces or constraints are evaluated at the ends of an element, where a break may be. There, such an element
+/// is shortened by a few ulps of the time, so that it sees what is on its own side. Others keep their length: the time
+/// that is left out at each of many breaks would add up.
+pub(crate) fn looks_at_ends(element: Element, is_constrained: bool) -> bool {
+    let has_points_there =
+        matches!(element.family(), Family::Radau) || matches!(element.rule(), Rule::Lobatto(_));
+    has_points_there || is_constrained
 }
 
 /// The first and the last of at least two times.
@@ -406,6 +433,11 @@ impl Segment {
 
     fn check_resolution(&self) -> Result<(), RunErrorKind> {
         check_resolution(self.start.abs().max(self.end.abs()), self.step)
+    }
+
+    /// Makes elements as long as the time between their nodes.
+    fn forget_breaks(&mut self) {
+        self.at_break = (false, false);
     }
 
     /// The length of the k-th element.

@@ -321,6 +321,34 @@ fn elements_end_at_the_times_of_a_table() {
     assert!((q - exact).abs() < 1e-13);
 }
 
+/// No time is left out at the times of a table: a mass that nothing pushes goes as far as its velocity says. All
+/// numbers are sums of powers of two.
+#[test]
+fn many_times_of_a_table_cost_no_time() {
+    for start in [0.0, 1e6, 1.7e9] {
+        let times: Vec<f64> = (0..=1000)
+            .map(|k| start + 0.015625 * f64::from(k))
+            .collect();
+        let simulation = Simulation::new(&Mass).step(0.25).table(
+            "u",
+            &times,
+            vec![0.0; times.len()],
+            Interpolation::Hold,
+        );
+        let begin = Mass.state([0.0], [1.0]);
+        let motion = simulation.run(begin, start..start + 15.625).unwrap();
+        assert_eq!(motion.last().q[0], 15.625, "from {start}");
+        let steps = simulation.steps(begin, start).take(1000).last();
+        assert_eq!(steps.unwrap().unwrap().q[0], 15.625, "from {start}");
+        let accurate = simulation.accuracy(1e-9).run(begin, start..start + 15.625);
+        let accurate = accurate.unwrap().last().q[0];
+        assert!(
+            (accurate - 15.625).abs() <= 1e-12,
+            "from {start}: {accurate}"
+        );
+    }
+}
+
 /// Events depend on inputs.
 #[test]
 fn events_of_inputs_are_met() {

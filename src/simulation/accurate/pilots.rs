@@ -55,7 +55,11 @@ impl<'r> Pilots<'r> {
             trace,
             apart: Vec::new(),
             sizes: Vec::new(),
-            mesh: given.even(&[span.start, span.end], (span.end - span.start).abs())?,
+            mesh: given.even(
+                element,
+                &[span.start, span.end],
+                (span.end - span.start).abs(),
+            )?,
             breaks: course.breaks.clone(),
             end: span.end,
             newton: 0,

@@ -3,7 +3,7 @@
 
 use crate::accuracy::Trace;
 use crate::error::RunErrorKind;
-use crate::simulation::times::Times;
+use crate::simulation::times::{Times, looks_at_ends};
 use std::ops::ControlFlow;
 use tfe_runtime::constrained::Trail;
 use tfe_runtime::step::Control;
@@ -25,6 +25,8 @@ pub(super) struct Given<'r> {
     pub(super) breaks: &'r [f64],
     /// The nodes that the caller gave.
     pub(super) nodes: Option<&'r [f64]>,
+    /// Whether the model has constraints.
+    pub(super) is_constrained: bool,
     /// Whether the run looks for events, which may cut elements.
     pub(super) has_events: bool,
     /// Whether steps may contain kinks or jumps of the force, so that the error may not fall with the order of the
@@ -34,13 +36,22 @@ pub(super) struct Given<'r> {
 
 impl Given<'_> {
     /// Elements of equal steps between given times.
-    pub(super) fn even(&self, cuts: &[f64], step: f64) -> Result<Times, RunErrorKind> {
-        Times::even(cuts, step, self.breaks)
+    pub(super) fn even(
+        &self,
+        element: Element,
+        cuts: &[f64],
+        step: f64,
+    ) -> Result<Times, RunErrorKind> {
+        Ok(self.for_element(element, Times::even(cuts, step, self.breaks)?))
     }
 
     /// The elements between given nodes.
-    pub(super) fn through(&self, nodes: &[f64]) -> Result<Times, RunErrorKind> {
-        Times::of_nodes(nodes, self.breaks)
+    pub(super) fn through(&self, element: Element, nodes: &[f64]) -> Result<Times, RunErrorKind> {
+        Ok(self.for_element(element, Times::of_nodes(nodes, self.breaks)?))
+    }
+
+    fn for_element(&self, element: Element, times: Times) -> Times {
+        times.whole_unless(looks_at_ends(element, self.is_constrained))
     }
 
     /// A trace without rows.

@@ -109,8 +109,8 @@ impl<'a> Runs<'a> {
     fn mesh(&self, way: &Way<'_>) -> Result<Times, RunErrorKind> {
         let given = self.run.given();
         match way.grading {
-            Some(grading) => given.through(&way.nodes(grading)),
-            None => given.even(way.cuts, way.step),
+            Some(grading) => given.through(way.element, &way.nodes(grading)),
+            None => given.even(way.element, way.cuts, way.step),
         }
     }
 

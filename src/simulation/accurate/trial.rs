@@ -65,6 +65,7 @@ where
                 start: (t, L::numbers(start)),
                 breaks: &run.breaks,
                 nodes: run.nodes.as_deref(),
+                is_constrained: M::IS_CONSTRAINED,
                 has_events: run.has_events(),
                 crosses_kinks: run.crosses_kinks(),
             },
