@@ -29,6 +29,18 @@ pub enum AtError {
         /// The outputs that there are.
         known: Vec<String>,
     },
+    /// The model given is not that of the run: an output has another value than the one recorded, as without the inputs
+    /// of the run or with other parameters.
+    OtherModel {
+        /// The output.
+        output: String,
+        /// The time of the recorded node.
+        time: f64,
+        /// The value that the run recorded.
+        recorded: f64,
+        /// The value that the model given has there.
+        computed: f64,
+    },
     /// No velocity belongs to the momentum at this time, for example because the mass matrix is singular there.
     NoVelocity {
         /// The time.
@@ -61,6 +73,16 @@ impl fmt::Display for AtError {
                 f,
                 "there is no output `{output}`; the model has `{}`",
                 known.join("`, `")
+            ),
+            Self::OtherModel {
+                output,
+                time,
+                recorded,
+                computed,
+            } => write!(
+                f,
+                "the model is not that of the run: at t = {time} its output `{output}` is {computed}, recorded was {recorded}; \
+                 it needs the parameters of the run, and after `.input(…)` or `.table(…)` the same inputs, as a `Driven` model"
             ),
             Self::NoVelocity { time } => {
                 write!(

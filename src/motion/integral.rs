@@ -4,6 +4,7 @@ use super::points::Points;
 use super::{AtError, Motion};
 use crate::evaluate::Evaluate;
 use crate::length::{Length, Polynomial};
+use crate::numbers::larger;
 
 impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// The integral of an output from the start to every recorded node,
@@ -39,8 +40,12 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// # }
     /// ```
     ///
+    /// The model is that of the run: after [`Simulation::input`](crate::Simulation::input), a [`Driven`](crate::Driven)
+    /// model with the same inputs.
+    ///
     /// # Errors
-    /// [`AtError::NoOutput`] if the model declares no such output, [`AtError::NotRecorded`] if `record_every` left out
+    /// [`AtError::NoOutput`] if the model declares no such output, [`AtError::OtherModel`] if its values differ from
+    /// those that the run recorded, [`AtError::NotRecorded`] if `record_every` left out
     /// elements, [`AtError::NoVelocity`] if no velocity belongs to a momentum, [`AtError::Model`] if the model does not
     /// pass its check.
     pub fn integral<M>(&self, model: &M, output: &str) -> Result<Vec<f64>, AtError>
@@ -57,6 +62,11 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
                 output: output.to_owned(),
                 known: names,
             });
+        };
+        let mut own = self.outputs.names.iter();
+        let place = OutputPlace {
+            column,
+            recorded: own.position(|name| name.is(output)),
         };
         let mut points = Points::new(self.nodes[0].v.clone());
         let (mut sum, mut integrals) = (0.0, vec![0.0]);
@@ -86,6 +96,7 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
                     Ok::<_, AtError>(())
                 })?;
             }
+            self.check_is_recorded(model, (output, place), node + 1, &mut values)?;
             integrals.push(sum);
         }
         if integrals.len() < self.nodes.len() {
@@ -94,4 +105,56 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         }
         Ok(integrals)
     }
+
+    /// Refuses a model that does not give a recorded value of an output again: that of a run with inputs, without
+    /// these, or one with other parameters.
+    fn check_is_recorded<M: Evaluate<N, L>>(
+        &self,
+        model: &M,
+        (output, place): (&str, OutputPlace),
+        node: usize,
+        values: &mut [f64],
+    ) -> Result<(), AtError> {
+        /// What the output changes in the part [`BESIDE`] of an element.
+        const NEAR: f64 = 1e-6;
+        /// An input may jump at the node, where the run has recorded its value on either side.
+        const BESIDE: f64 = 1e-9;
+        let recorded = place
+            .recorded
+            .and_then(|at| Some(self.outputs.row(node)?[at]));
+        let Some(recorded) = recorded.filter(|value| !value.is_nan()) else {
+            return Ok(());
+        };
+        let at = &self.nodes[node];
+        let beside = BESIDE * (at.t - self.nodes[node - 1].t);
+        let mut output_at = |t: f64| {
+            model.outputs(t, (&at.q, &at.p), &at.v, values);
+            values[place.column]
+        };
+        let computed = output_at(at.t);
+        let is_recorded = |value: f64| {
+            let size = larger(recorded.abs(), value.abs());
+            recorded == value || (recorded - value).abs() <= NEAR * size
+        };
+        if is_recorded(computed)
+            || is_recorded(output_at(at.t - beside))
+            || is_recorded(output_at(at.t + beside))
+        {
+            return Ok(());
+        }
+        Err(AtError::OtherModel {
+            output: output.to_owned(),
+            time: at.t,
+            recorded,
+            computed,
+        })
+    }
+}
+
+/// Where an output stands among those of a model, and among those that a motion has recorded.
+#[derive(Clone, Copy)]
+struct OutputPlace {
+    column: usize,
+    /// `None` if the model of the run declares no such output.
+    recorded: Option<usize>,
 }

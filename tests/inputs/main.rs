@@ -4,8 +4,8 @@ mod failures;
 mod loops;
 mod rates;
 
-use tfe::Driven;
 use tfe::prelude::*;
+use tfe::{AtError, Driven};
 
 /// A pendulum with a moved pivot and a driven axis: inputs in the energy, in forces, and in outputs.
 #[dynamics(
@@ -121,6 +121,44 @@ fn w(t: f64) -> f64 {
 
 fn u(t: f64) -> f64 {
     0.1 * t.sin() * (-t / 10.0).exp()
+}
+
+/// Without the inputs of the run an output has other values: that integral is an error, not a wrong number.
+#[test]
+fn integrals_of_outputs_need_the_inputs_of_the_run() {
+    let start = WRITTEN.state([1.0], [0.5]);
+    let driven = Driven::new(&DRIVING).input("u", u).unwrap();
+    let driven = driven.input("w", w).unwrap();
+    let given = Simulation::new(&DRIVING).step(0.05);
+    let given = given.input("u", u).input("w", w);
+    let written = Simulation::new(&WRITTEN).step(0.05);
+    let (a, b) = (
+        given.run(start, 0.0..5.0).unwrap(),
+        written.run(start, 0.0..5.0).unwrap(),
+    );
+    let (a, b) = (
+        a.integral(&driven, "torque").unwrap(),
+        b.integral(&WRITTEN, "torque").unwrap(),
+    );
+    assert_eq!(a.len(), b.len());
+    for (a, b) in a.iter().zip(&b) {
+        // Other kernels with the same numbers, after a hundred steps.
+        assert!((a - b).abs() < 1e-12, "{a} {b}");
+    }
+    let motion = given.run(start, 0.0..5.0).unwrap();
+    let told = motion.integral(&DRIVING, "torque").unwrap_err();
+    assert!(matches!(told, AtError::OtherModel { .. }), "{told}");
+    assert!(told.to_string().contains("`Driven`"), "{told}");
+    // Other parameters are another model, too.
+    let motion = written.run(start, 0.0..5.0).unwrap();
+    let thick = Written { c: 0.06, ..WRITTEN };
+    let told = motion.integral(&thick, "torque").unwrap_err();
+    assert!(matches!(told, AtError::OtherModel { .. }), "{told}");
+    // An output without inputs needs none.
+    let pushed = Simulation::new(&Mass).step(0.1).input("u", |t| 2.0 * t);
+    let motion = pushed.run(Mass.state([0.0], [0.0]), 0.0..2.0).unwrap();
+    let place = motion.integral(&Mass, "place").unwrap();
+    assert!((place[20] - 4.0 / 3.0).abs() < 1e-12); // x = t³/3
 }
 
 /// A function given at run time gives the same as one written in the declaration, in all kinds of runs.
