@@ -20,13 +20,15 @@ impl Mesh {
             return Ok(Self { fractions });
         }
         let total: f64 = weights.iter().sum();
-        for (element, weight) in weights.iter().enumerate() {
-            if !(*weight > 0.0 && total.is_finite()) {
-                return Err(MeshError::Weight {
-                    element,
-                    weight: *weight,
-                });
-            }
+        let is_wrong = |weight: &f64| !(*weight > 0.0 && weight.is_finite());
+        let wrong = weights.iter().position(is_wrong);
+        // If only their sum overflows, it is the largest.
+        let largest = (0..weights.len()).max_by(|a, b| weights[*a].total_cmp(&weights[*b]));
+        if let Some(element) = wrong.or(largest.filter(|_| !total.is_finite())) {
+            return Err(MeshError::Weight {
+                element,
+                weight: weights[element],
+            });
         }
         let mut sum = 0.0;
         let mut fractions = vec![0.0];
@@ -201,7 +203,17 @@ mod tests {
     fn meshes_without_elements_or_with_bad_weights_are_errors() {
         assert_eq!(Mesh::new(0, &[]), Err(MeshError::NoElements));
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(Mesh::new(2, &[1.0, bad]).is_err());
+            let told = Mesh::new(2, &[1.0, bad]).expect_err("a bad weight");
+            assert!(
+                matches!(told, MeshError::Weight { element: 1, .. }),
+                "{told}"
+            );
         }
+        // Only the sum overflows.
+        let told = Mesh::new(3, &[1.0, 1e308, 9e307]).expect_err("no finite sum");
+        assert!(
+            matches!(told, MeshError::Weight { element: 1, .. }),
+            "{told}"
+        );
     }
 }
