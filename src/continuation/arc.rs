@@ -124,6 +124,22 @@ impl<const N: usize> Metric<N> {
         whole > 0.0 && self.product(&from, &to) < LEFT * whole
     }
 
+    /// The same product of orbits on elements of half the length, where the nodes in the middle of the elements have no
+    /// weight.
+    pub(super) fn on_halves(&self) -> Self {
+        let shares = self.shares.iter().flat_map(|share| [*share, 0.0]);
+        Self {
+            shares: shares.collect(),
+            ..self.clone()
+        }
+    }
+
+    /// The length of an iterate relative to the range of λ: of a difference of orbits, its root mean square in half
+    /// ranges of the components.
+    pub(super) fn relative(&self, a: &Iterate<N>) -> f64 {
+        self.product(a, a).sqrt() / self.width
+    }
+
     /// a / √⟨a, a⟩.
     pub(super) fn unit(&self, mut a: Iterate<N>) -> Iterate<N> {
         let norm = self.product(&a, &a).sqrt();

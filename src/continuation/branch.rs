@@ -1,6 +1,7 @@
 //! A branch of periodic orbits: the result of continuation.
 
 use super::events::EventKind;
+use super::warning::BranchWarning;
 use crate::assembly::{Iterate, Mesh, Solution};
 use crate::csv::{self, Column};
 use crate::periodic::{Orbit, Verdict};
@@ -76,6 +77,10 @@ pub struct Event<const N: usize> {
     /// changed its sign. Where another branch crosses, the orbit is interpolated, and this is the difference of two
     /// interpolations.
     pub width: f64,
+    /// Whether elements of half the length confirm the event: there as well the test function changes its sign between
+    /// the points beside it, with values of nearly the same size. If not, the event may be one of the elements and not
+    /// of the model, as a fold of a branch that approaches a homoclinic orbit; see [`Branch::warnings`].
+    pub resolved: bool,
 }
 
 /// How a branch ended without an error.
@@ -155,6 +160,7 @@ pub struct Branch<M, const N: usize> {
     pub(super) members: Vec<Member<M, N>>,
     pub(super) event_members: Vec<Member<M, N>>,
     pub(super) end: Option<End>,
+    pub(super) warnings: Vec<BranchWarning>,
     pub(super) statistics: Statistics,
 }
 
@@ -169,6 +175,7 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
             members: Vec::new(),
             event_members: Vec::new(),
             end: None,
+            warnings: Vec::new(),
             statistics: Statistics::NONE,
         }
     }
@@ -191,6 +198,12 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
     /// How the branch ended; `None` if an error ended it.
     pub fn end(&self) -> Option<End> {
         self.end
+    }
+
+    /// What makes the branch doubtful, in the order in which it was found; empty if elements of half the length confirm
+    /// all events and the points that were compared, see [`Continuation`](super::Continuation#resolution).
+    pub fn warnings(&self) -> &[BranchWarning] {
+        &self.warnings
     }
 
     /// The name of the parameter.
@@ -229,7 +242,8 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
         self.event_members.get(event).map(|member| &member.model)
     }
 
-    /// Counts of iterations, evaluations and factorisations of the whole branch, including its events.
+    /// Counts of iterations, evaluations and factorisations of the whole branch, including its events, without the
+    /// comparisons with elements of half the length.
     pub fn statistics(&self) -> &Statistics {
         &self.statistics
     }
@@ -277,6 +291,7 @@ impl<M, const N: usize> fmt::Debug for Branch<M, N> {
             .field("points", &self.points.len())
             .field("events", &events)
             .field("end", &self.end)
+            .field("warnings", &self.warnings)
             .finish_non_exhaustive()
     }
 }

@@ -94,6 +94,12 @@ impl Tests {
         }
     }
 
+    /// The same with dλ/ds in another metric.
+    pub(super) fn with_slope(mut self, slope: f64) -> Self {
+        self.values[EventKind::Fold as usize] = slope;
+        self
+    }
+
     /// The value of the test function of an event.
     pub(super) fn value(&self, kind: EventKind) -> f64 {
         self.values[kind as usize]
@@ -139,7 +145,7 @@ impl Signs {
 
 /// The bound below which a test function counts as zero, as one that vanishes identically because of a symmetry of the
 /// multipliers.
-const ROUND_OFF: f64 = 1e-9;
+pub(super) const ROUND_OFF: f64 = 1e-9;
 
 /// Whether a zero of the torus test function is a torus bifurcation: the pair with product one must be complex, since
 /// two real multipliers μ, 1/μ have no meaning.

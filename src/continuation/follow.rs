@@ -1,16 +1,18 @@
 //! Follows a branch: predictor, corrector, step size control, and the search for bifurcations between two orbits.
 
 use super::arc::{Between, Metric, Row};
-use super::branch::{Branch, End, Event, Frame, Member, Point, Tangent, amplitudes};
+use super::branch::{Branch, End, Event, Frame, Point, Tangent, amplitudes};
 use super::error::ContinuationErrorKind;
-use super::events::{Circumstances, EventKind, Signs, Tests, is_torus};
+use super::events::{EventKind, Signs, is_torus};
+use super::halves::{Halves, are_confirmed};
 use super::problem::Continued;
 use super::progress::Progress;
+use super::solved::{Solved, solved};
+use super::warning::BranchWarning;
 use crate::assembly::{Assembly, AssemblyError, Control, Iterate, Problem};
 use crate::periodic::OrbitError;
-use crate::periodic::orbit::{multipliers_of, trivial_of};
-use crate::periodic::problem::{Global, Periodic};
-use crate::periodic_schur::Multiplier;
+use crate::periodic::orbit::trivial_of;
+use crate::periodic::problem::Global;
 use crate::stability::chebyshev::bracketed_root;
 use std::ops::Range;
 use tfe_runtime::{Element, Model};
@@ -48,26 +50,6 @@ impl Course {
     }
 }
 
-/// An orbit with the data needed to continue from it.
-#[derive(Clone)]
-struct Solved<M, const N: usize> {
-    member: Member<M, N>,
-    floquet: Vec<Multiplier>,
-    /// A unit vector.
-    tangent: Iterate<N>,
-    /// dT/dλ, if the period is a given function of the parameter.
-    rate: f64,
-    tests: Tests,
-    iterations: u32,
-}
-
-impl<M, const N: usize> Solved<M, N> {
-    fn parameter(&self) -> f64 {
-        let globals = &self.member.iterate.globals;
-        globals.last().copied().unwrap_or(f64::NAN)
-    }
-}
-
 /// A successful step.
 struct Step<M, const N: usize> {
     next: Solved<M, N>,
@@ -97,6 +79,7 @@ pub(super) struct Follower<'c, M, const N: usize> {
     last: Solved<M, N>,
     /// The signs of the test functions up to the last orbit.
     signs: Signs,
+    halves: Halves<'c, M, N>,
 }
 
 impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
@@ -134,15 +117,17 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         let last = solved(&problem, &assembly, iterate, tangent, assembly.iterations())?;
         let mut signs = Signs::default();
         signs.pass(&last.tests);
+        // If more iterations are needed, the step is too long.
+        let control = Control {
+            max_iterations: MOST_ITERATIONS,
+            ..control
+        };
         Ok(Self {
             signs,
+            halves: Halves::new(&problem, element, control)?,
             problem,
             assembly,
-            // If more iterations are needed, the step is too long.
-            control: Control {
-                max_iterations: MOST_ITERATIONS,
-                ..control
-            },
+            control,
             course,
             metric,
             frame,
@@ -154,10 +139,24 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
     pub(super) fn run(
         mut self,
         branch: &mut Branch<M, N>,
-        mut progress: Progress,
+        progress: Progress,
     ) -> Result<(), ContinuationErrorKind> {
         branch.frame = Some(self.frame.clone());
         self.record(branch);
+        let followed = self.follow(branch, progress);
+        branch.statistics = self.assembly.statistics();
+        if !is_compared(branch.points.len() - 1) {
+            self.compare_last(branch);
+        }
+        followed
+    }
+
+    /// Takes steps from the first orbit, which is recorded, until the branch ends.
+    fn follow(
+        &mut self,
+        branch: &mut Branch<M, N>,
+        mut progress: Progress,
+    ) -> Result<(), ContinuationErrorKind> {
         // The first step is measured in the parameter.
         let slope = self.last.tests.value(EventKind::Fold).abs();
         let Steps {
@@ -178,7 +177,6 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
                     break;
                 }
                 Err(source) => {
-                    branch.statistics = self.assembly.statistics();
                     return Err(ContinuationErrorKind::Step {
                         parameter: self.last.parameter(),
                         step,
@@ -190,6 +188,9 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             let iterations = taken.next.iterations;
             self.accept(taken.next);
             self.record(branch);
+            if is_compared(branch.points.len() - 1) {
+                self.compare_last(branch);
+            }
             progress.show(branch.points.len(), self.last.parameter());
             if taken.ended {
                 branch.end = Some(End::Range);
@@ -197,7 +198,6 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             }
             step = adapted(step, iterations, taken.turn).clamp(smallest, largest);
         }
-        branch.statistics = self.assembly.statistics();
         branch.end = branch.end.or(Some(End::Points));
         Ok(())
     }
@@ -206,6 +206,24 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
     fn record(&self, branch: &mut Branch<M, N>) {
         branch.points.push(self.point(&self.last));
         branch.members.push(self.last.member.clone());
+    }
+
+    /// Compares the last orbit with that of elements of half the length, unless an orbit before it has a warning.
+    fn compare_last(&mut self, branch: &mut Branch<M, N>) {
+        let is_point =
+            |warning: &BranchWarning| matches!(warning, BranchWarning::Unresolved { .. });
+        if branch.warnings.iter().any(is_point) {
+            return;
+        }
+        let point = branch.points.len() - 1;
+        let before = point
+            .checked_sub(1)
+            .map_or(0.0, |before| branch.points[before].tangent.parameter);
+        let compared = self.halves.compare(&self.frame, &self.metric, &self.last);
+        if !compared.is_direction_left(before) {
+            let warning = compared.warning(point, self.last.parameter());
+            branch.warnings.push(warning);
+        }
     }
 
     fn point(&self, solved: &Solved<M, N>) -> Point<N> {
@@ -332,7 +350,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         let between = self.last.tests.changes(&next.tests);
         let kinds: Vec<(EventKind, bool)> =
             at_last.chain(between.map(|kind| (kind, false))).collect();
-        let mut found: Vec<(EventKind, Located<M, N>)> = Vec::new();
+        let mut found: Vec<(EventKind, bool, Located<M, N>)> = Vec::new();
         for (kind, is_at_last) in kinds {
             let located = if is_at_last {
                 self.at_last(next, kind)
@@ -342,16 +360,31 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             let floquet = &located.solved.floquet;
             let trivial = trivial_of(floquet, self.frame.trivial);
             if kind != EventKind::Torus || is_torus(floquet, &trivial) {
-                found.push((kind, located));
+                found.push((kind, is_at_last, located));
             }
         }
-        found.sort_by(|(_, a), (_, b)| a.part.total_cmp(&b.part));
-        for (kind, at) in found {
+        if found.is_empty() {
+            return;
+        }
+        found.sort_by(|(.., a), (.., b)| a.part.total_cmp(&b.part));
+        let ends = [&self.last, next];
+        let ends = ends.map(|end| self.halves.compare(&self.frame, &self.metric, end));
+        for (kind, is_at_last, at) in found {
+            // A test function that vanishes at the last orbit has no sign there.
+            let resolved = are_confirmed(kind, &ends[usize::from(is_at_last)..]);
+            if !resolved {
+                branch.warnings.push(BranchWarning::UnresolvedEvent {
+                    event: branch.events.len(),
+                    kind,
+                    parameter: at.solved.parameter(),
+                });
+            }
             branch.events.push(Event {
                 kind,
                 point: self.point(&at.solved),
                 after: branch.points.len() - 1,
                 width: at.width,
+                resolved,
             });
             branch.event_members.push(at.solved.member);
         }
@@ -512,49 +545,10 @@ const SPACING: f64 = 0.02;
 /// interpolation.
 const NEAR: f64 = 1e-2;
 
-/// An orbit from a converged iterate.
-fn solved<M: Model<N> + Clone, const N: usize>(
-    problem: &Continued<'_, M, N>,
-    assembly: &Assembly<N>,
-    iterate: Iterate<N>,
-    tangent: Iterate<N>,
-    iterations: u32,
-) -> Result<Solved<M, N>, OrbitError> {
-    let transitions = assembly.transitions().to_vec();
-    // The motions that the constraints allow are evaluated at the current parameter.
-    let orbit = Periodic {
-        model: &problem.model,
-        ..problem.orbit.clone()
-    };
-    let floquet = multipliers_of(&orbit, &iterate.nodes, &transitions)?;
-    let trivial = trivial_of(&floquet, orbit.trivial());
-    let slope = tangent.globals.last().copied().unwrap_or(f64::NAN);
-    // The determinant at fixed parameter is dλ/ds times that with arc length.
-    let sign = match problem.row {
-        Row::Parameter(_) => assembly.sign() * slope.signum(),
-        Row::Arc { .. } => assembly.sign(),
-    };
-    let tests = Tests::new(&Circumstances {
-        slope,
-        sign,
-        floquet: &floquet,
-        trivial: &trivial,
-        symplectic: !M::FACTS.forced,
-    });
-    Ok(Solved {
-        rate: problem.rate,
-        member: Member {
-            model: problem.model.clone(),
-            iterate,
-            transitions,
-            period: problem.orbit.period,
-            unfolding: problem.orbit.unfolding,
-        },
-        floquet,
-        tangent,
-        tests,
-        iterations,
-    })
+/// Whether an orbit is compared with that of elements of half the length: those of the numbers 8, 16, 32, …, which cost
+/// little beside all others. The last orbit and those beside events are compared as well.
+fn is_compared(point: usize) -> bool {
+    point >= 8 && point.is_power_of_two()
 }
 
 /// The length of the next step.

@@ -1,9 +1,11 @@
 //! Branches of periodic orbits that end at rest, and in units of any size.
 
-use crate::continuation::{close, kinds};
+use crate::continuation::{close, kinds, resolved};
 use crate::models::PENDULUM;
 use std::f64::consts::TAU;
-use tfe::continuation::{Branch, ContinuationErrorKind, End, EventKind};
+use tfe::continuation::{
+    Branch, BranchWarning, ContinuationError, ContinuationErrorKind, End, EventKind,
+};
 use tfe::prelude::*;
 
 /// A hardening oscillator, and next to it a linear one, damped, with a force in other units.
@@ -182,4 +184,72 @@ fn parameters_that_are_no_numbers_are_told() {
             "{error}"
         );
     }
+}
+
+/// A damped rotor, driven by a torque. It rotates as long as the torque is above that of a homoclinic orbit; the period
+/// grows without bounds towards it, and there are no folds.
+#[dynamics(
+    coordinates(theta),
+    lagrangian = dot(theta)^2/2 + cos(theta),
+    force(theta) = torque - dot(theta)/2,
+    sensitivity(torque),
+)]
+#[derive(Clone)]
+struct Rotor {
+    torque: f64,
+}
+
+/// The rotations of the rotor on 60 equal elements, down to a torque.
+fn rotations(element: Element, end: f64, points: usize) -> Branch<Rotor, 1> {
+    let rotor = Rotor { torque: 1.5 };
+    Continuation::of(&rotor)
+        .parameter(|rotor| &mut rotor.torque)
+        .range(1.5..end)
+        .element(element)
+        .elements(60)
+        .unknown_period(TAU / 3.0)
+        .advance([TAU])
+        .guess(|t| ([3.0 * t], [3.0]))
+        .largest_step(1.2)
+        .max_points(points)
+        .run()
+        .unwrap_or_else(ContinuationError::into_partial)
+}
+
+/// Elements of order 8 have a fold towards the homoclinic orbit, at 0.59738, where the ends of all elements are right to
+/// 1e-6 of the motion; elements of order 6 go on to torques for which nothing rotates.
+#[test]
+fn a_branch_towards_a_homoclinic_orbit_tells_when_it_is_not_resolved() {
+    for element in [Element::mixed(5), Element::mixed(4)] {
+        let branch = rotations(element, 0.3, 70);
+        let mut folds = branch.events_of(EventKind::Fold);
+        assert!(folds.all(|fold| !fold.resolved), "{branch:?}");
+        let first = branch.warnings().iter().find_map(|warning| match warning {
+            BranchWarning::Unresolved { point, .. } => Some(*point),
+            _ => None,
+        });
+        // At the period 15 the torque changes a thousand times as much as its error does.
+        let first = &branch.points()[first.expect("a warning of a point")];
+        assert!(first.period > 15.0, "{}", first.period);
+    }
+}
+
+/// The same elements resolve the same branch as far as its period is five times as long.
+#[test]
+fn a_branch_that_is_resolved_has_no_warning() {
+    for element in [Element::mixed(5), Element::mixed(4)] {
+        let branch = rotations(element, 0.6, 70);
+        assert!(resolved(&branch).is_empty());
+        assert_eq!(branch.end(), Some(End::Range));
+        let last = branch.points().last().expect("points");
+        assert!(last.period > 10.0, "{}", last.period);
+    }
+}
+
+/// The folds of a resonance are of the model, whether a step ends just beside them or not.
+#[test]
+fn folds_are_confirmed_by_finer_elements() {
+    let folds = [EventKind::Fold, EventKind::Fold];
+    assert_eq!(resolved(&response(0.0, 3.5)), folds);
+    assert_eq!(resolved(&response(1e9, 3.5)), folds);
 }

@@ -44,6 +44,14 @@ pub(crate) fn kinds<M: Model<N>, const N: usize>(branch: &Branch<M, N>) -> Vec<E
     branch.events().iter().map(|event| event.kind).collect()
 }
 
+/// The kinds of the events of a branch that finer elements confirm as a whole.
+#[track_caller]
+pub(crate) fn resolved<M: Model<N>, const N: usize>(branch: &Branch<M, N>) -> Vec<EventKind> {
+    assert!(branch.warnings().is_empty(), "{:?}", branch.warnings());
+    assert!(branch.events().iter().all(|event| event.resolved));
+    kinds(branch)
+}
+
 #[track_caller]
 pub(crate) fn close(value: f64, expected: f64, tolerance: f64) {
     assert!(
@@ -55,7 +63,7 @@ pub(crate) fn close(value: f64, expected: f64, tolerance: f64) {
 #[test]
 fn both_folds_of_a_hardening_resonance() {
     let (coarse, fine) = (response(40), response(80));
-    assert_eq!(kinds(&coarse), [EventKind::Fold, EventKind::Fold]);
+    assert_eq!(resolved(&coarse), [EventKind::Fold, EventKind::Fold]);
     assert_eq!(coarse.end(), Some(End::Range));
     assert_eq!(kinds(&fine), kinds(&coarse));
     for (coarse, fine) in coarse.events().iter().zip(fine.events()) {
@@ -167,7 +175,7 @@ fn a_period_doubles_in_one_well() {
         .guess(|_| ([1.0], [0.0]))
         .run()
         .expect("a branch");
-    assert_eq!(kinds(&branch), [EventKind::PeriodDoubling]);
+    assert_eq!(resolved(&branch), [EventKind::PeriodDoubling]);
     let event = &branch.events()[0];
     close(event.point.multipliers[0].re, -1.0, 1e-11);
     assert!(event.width < 1e-12);
@@ -237,7 +245,7 @@ fn locking_is_lost_to_a_torus() {
         .guess(|t| ([2.0 * t.sin()], [2.0 * t.cos()]))
         .run()
         .expect("a branch");
-    assert_eq!(kinds(&branch), [EventKind::Torus]);
+    assert_eq!(resolved(&branch), [EventKind::Torus]);
     let torus = &branch.events()[0].point;
     assert!(torus.multipliers[0].im != 0.0);
     close(torus.multipliers[0].norm(), 1.0, 1e-12);
@@ -274,7 +282,7 @@ fn a_symmetric_response_meets_one_that_is_not() {
             .expect("a branch")
     };
     let (branch, other) = (run(0.2), run(0.11));
-    assert_eq!(kinds(&branch), [EventKind::Branch]);
+    assert_eq!(resolved(&branch), [EventKind::Branch]);
     assert_eq!(kinds(&other), [EventKind::Branch]);
     let (event, again) = (&branch.events()[0], &other.events()[0]);
     // Interpolated between different points each time.
@@ -326,7 +334,7 @@ fn a_limit_cycle_in_its_damping() {
         .guess(|t| ([2.0 * t.cos()], [-2.0 * t.sin()]))
         .run()
         .expect("a branch");
-    assert!(branch.events().is_empty());
+    assert!(resolved(&branch).is_empty());
     assert!(branch.points().iter().all(Point::is_stable));
     let last = branch.points().last().expect("points");
     let stiff = VanDerPol::unit(5.0);
@@ -407,7 +415,7 @@ fn a_conservative_period_doubles_at_one_energy_scaled() {
             })
             .run()
             .expect("a branch");
-        assert_eq!(kinds(&branch), [EventKind::PeriodDoubling]);
+        assert_eq!(resolved(&branch), [EventKind::PeriodDoubling]);
         let motion = branch.event_orbit(0).expect("an orbit").motion();
         let event = &branch.events()[0].point;
         // Two multipliers meet at −1: each is known to the square root of the rounding unit.
