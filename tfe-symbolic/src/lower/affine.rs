@@ -356,11 +356,15 @@ impl Lowerer<'_> {
         let large = weights.fold(LARGE_LENGTH, u64::saturating_add);
         let of_run_time = affines.iter().any(|affine| affine.is_of_run_time());
         let mut looked_at = assignments(names.len(), large.min(MAX_LENGTH) as i64);
-        if of_run_time && !self.is_of_run_time_length() {
+        if of_run_time {
             if names.len() > MOST_COMBINED {
                 return None;
             }
-            looked_at.extend(combinations(names.len()));
+            let least = match self.is_of_run_time_length() {
+                true => SMALL_LENGTHS.0,
+                false => 0,
+            };
+            looked_at.extend(combinations(names.len(), least));
         }
         let mut side = None;
         for lengths in looked_at {
@@ -429,8 +433,8 @@ const MAX_LENGTH: u64 = 1 << 32;
 /// All lengths in this range are examined. Arrays of one element, for which `q[2*i]` is correct, are never intended.
 const SMALL_LENGTHS: (i64, i64) = (2, 12);
 
-/// In models of fixed size a field may be an index itself, or an end of a range: all combinations of these values are
-/// examined as well.
+/// A field may be an index itself, or an end of a range: all combinations of these values are examined as well, in models
+/// of run-time length from the least of [`SMALL_LENGTHS`] on.
 const SMALL_VALUES: [i64; 9] = [0, 1, 2, 3, 4, 5, 6, 8, 12];
 
 /// The number of fields of which that is possible.
@@ -470,11 +474,17 @@ fn assignments(count: usize, large: i64) -> Vec<Vec<i64>> {
     all
 }
 
-/// All combinations of [`SMALL_VALUES`].
-fn combinations(count: usize) -> Vec<Vec<i64>> {
+/// All combinations of [`SMALL_VALUES`] from the least on.
+fn combinations(count: usize, least: i64) -> Vec<Vec<i64>> {
+    let values = SMALL_VALUES.into_iter().filter(|value| *value >= least);
+    let values: Vec<i64> = values.collect();
     let mut all = vec![Vec::new()];
     for _ in 0..count {
-        let longer = |before: &Vec<i64>| SMALL_VALUES.map(|value| [&before[..], &[value]].concat());
+        let longer = |before: &Vec<i64>| -> Vec<Vec<i64>> {
+            let each = values.iter();
+            each.map(|value| [&before[..], &[*value]].concat())
+                .collect()
+        };
         all = all.iter().flat_map(longer).collect();
     }
     all

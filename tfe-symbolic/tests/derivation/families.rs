@@ -23,6 +23,7 @@ fn context(text: &str) -> Context {
     let kinds = [
         ("n", FieldKind::Length),
         ("w", FieldKind::Length),
+        ("first", FieldKind::Length),
         ("k", FieldKind::Scalar),
         ("a", FieldKind::Scalar),
         ("m", FieldKind::Vector),
@@ -213,6 +214,19 @@ fn requirements_of_chosen_elements() {
         assert!(all.contains(&"c[n] for , 0 loops".to_owned()), "{all:?}");
         assert!(!all.iter().any(|one| one.starts_with("c:")), "{all:?}");
     }
+}
+
+/// Both ends of a range may be fields beside the length of the array.
+#[test]
+fn ranges_between_two_fields() {
+    let outside = |index: &str| {
+        let text = format!(
+            "coordinates(q[n]), lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in first..w, k*q[{index}]^2)"
+        );
+        declare(&text, &context(&text)).is_err()
+    };
+    assert!(!outside("i+1") && !outside("i-1") && !outside("n-i"));
+    assert!(outside("n+i") && outside("-i-1"));
 }
 
 /// In models of fixed size fields may be indices and ends of ranges, also of arrays of a few elements.
