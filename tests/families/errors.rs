@@ -55,16 +55,8 @@ fn lengths_are_checked_before_anything_else() {
         error,
         "the array `r[w]` has no elements",
     );
-    let error = family::ModelError::EmptyRange {
-        ranges: "i in 0..n-1",
-        start: 0,
-        end: 0,
-    };
-    check(
-        &coupled(1, 3, 1, 0),
-        error,
-        "the sum over `i in 0..n-1` is empty: its range is 0..0",
-    );
+    // One site has no neighbour.
+    assert_eq!(coupled(1, 3, 1, 0).check(), Ok(()));
     let (field, index, ranges) = ("m", "i", "i in 0..n");
     let error = family::ModelError::FieldLength {
         field,
@@ -104,6 +96,45 @@ fn lengths_are_checked_before_anything_else() {
         error,
         "the index of `r[j]` in the sum over `j in 0..n` becomes 2, but `r` has 2 elements",
     );
+}
+
+/// Sums without terms are zero; ranges that end below their start are not meant, and those that are empty beyond the end of
+/// an array have no place for what their loops leave.
+#[test]
+fn ranges_without_terms_end_where_they_start() {
+    #[dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in 0..n-2, (q[i+2] - 2*q[i+1] + q[i])^4),
+    )]
+    struct Beam {
+        n: usize,
+    }
+    #[dynamics(
+        coordinates(q[n]),
+        lagrangian = sum(i in 0..n, dot(q[i])^2/2) - sum(i in a..b, (q[i+1] - q[i])^4),
+    )]
+    struct Part {
+        n: usize,
+        a: usize,
+        b: usize,
+    }
+    assert_eq!(Beam { n: 2 }.check(), Ok(()));
+    let error = Beam { n: 1 }.check().expect_err("no sum of -1 terms");
+    let ranges = "i in 0..n-2";
+    let (start, end) = (0, -1);
+    let expected = family::ModelError::EmptyRange { ranges, start, end };
+    assert_eq!(error, expected);
+    let message = "the sum over `i in 0..n-2` ends below its start: its range is 0..-1";
+    assert_eq!(error.to_string(), message);
+    let part = |a, b| Part { n: 3, a, b }.check().map_err(|e| e.to_string());
+    assert_eq!(
+        (part(0, 2), part(0, 0), part(2, 2)),
+        (Ok(()), Ok(()), Ok(()))
+    );
+    let message = "the sum over `i in a..b` is empty: its range is 3..3";
+    assert_eq!(part(3, 3), Err(message.to_owned()));
+    let message = "the sum over `i in a..b` ends below its start: its range is 2..1";
+    assert_eq!(part(2, 1), Err(message.to_owned()));
 }
 
 /// Sums of lengths do not overflow either, and nothing is counted up to them.

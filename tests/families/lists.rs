@@ -177,7 +177,7 @@ fn entries_of_lists_are_checked() {
         model.bonds = 0;
         (model.left, model.right, model.k) = (Vec::new(), Vec::new(), Vec::new());
     });
-    let message = "the sum over `b in 0..bonds` is empty: its range is 0..0";
+    let message = "`output(stretch[b in 0..bonds])` is empty: its range is 0..0";
     assert_eq!(none.to_string(), message);
     let mut model = network();
     model.left[5] = 9;

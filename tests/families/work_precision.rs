@@ -312,8 +312,8 @@ fn starts_and_models_that_do_not_fit_are_errors() {
         RunErrorKind::Family(family::ModelError::Length { field: "n", .. })
     ));
     assert!(matches!(
-        error(&Toda { n: 1 }, &[0.0], &[0.0]),
-        RunErrorKind::Family(family::ModelError::EmptyRange { .. })
+        error(&Toda { n: 0 }, &[], &[]),
+        RunErrorKind::Family(family::ModelError::NoElements { array: "q[n]" })
     ));
     let lost = error(&toda, &[0.0, 0.0, f64::NAN, 0.0, 0.0], &[0.0; 5]);
     assert!(matches!(lost, RunErrorKind::Start { coordinate: 2, .. }));

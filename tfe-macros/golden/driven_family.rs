@@ -50,8 +50,12 @@ const _: () = {
         fn check(&self) -> ::core::result::Result<(), __tfe::FamilyError> {
             __tfe::checks::length("n", self.n)?;
             __tfe::checks::elements("q[n]", self.n)?;
-            __tfe::checks::turns("i in 0..n", 0, (self.n as i64))?;
-            __tfe::checks::turns("i in 0..n-1", 0, (self.n as i64) - 1)?;
+            __tfe::checks::terms(
+                "i in 0..n-1",
+                0,
+                (self.n as i64) - 1,
+                ((self.n as i64), &[((self.n as i64) - 1)]),
+            )?;
             __tfe::checks::index(("q", "0", ""), 0, self.n)?;
             ::core::result::Result::Ok(())
         }

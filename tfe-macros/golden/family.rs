@@ -60,8 +60,12 @@ const _: () = {
                 self.m.len(),
                 &[((self.n as i64), "i", "i in 0..n")],
             )?;
-            __tfe::checks::turns("i in 0..n", 0, (self.n as i64))?;
-            __tfe::checks::turns("i in 0..w", 0, (self.w as i64))?;
+            __tfe::checks::terms(
+                "i in 0..w",
+                0,
+                (self.w as i64),
+                ((self.n as i64) + 1, &[((self.w as i64) + 1)]),
+            )?;
             for i in 0..self.w {
                 __tfe::checks::index(("q", "i+1", "i in 0..w"), (i as i64) + 1, self.n)?;
             }

@@ -37,9 +37,29 @@ pub(crate) fn statements(declared: &Declared) -> TokenStream {
                 let one = quote!((#length, #text, #ranges));
                 lengths.get_or_default(field).push(one);
             }
-            Requirement::Turns { ranges, start, end } => {
+            Requirement::Turns {
+                empty: Some(places),
+                start,
+                end,
+                ..
+            } if places.is_empty() && is_never_below(end, start) => {}
+            Requirement::Turns {
+                ranges,
+                start,
+                end,
+                empty,
+            } => {
                 let (start, end) = (indices::signed(start), indices::signed(end));
-                rest.push(quote!(__tfe::checks::turns(#ranges, #start, #end)?;));
+                rest.push(match empty {
+                    None => quote!(__tfe::checks::turns(#ranges, #start, #end)?;),
+                    Some(places) => {
+                        let coordinates = indices::signed(&declared.dof);
+                        let places = places.iter().map(indices::signed);
+                        // In parentheses: clippy takes a difference in a list for a forgotten comma.
+                        let places = quote!((#coordinates, &[#((#places)),*]));
+                        quote!(__tfe::checks::terms(#ranges, #start, #end, #places)?;)
+                    }
+                });
             }
             Requirement::Index {
                 array,
@@ -117,6 +137,14 @@ pub(crate) fn guard(
     (guard, "; NaN if the model does not pass its `check`")
 }
 
+/// Whether a range does not end below its start, whatever the lengths.
+fn is_never_below(end: &Affine, start: &Affine) -> bool {
+    let length = end.plus_scaled(start, -1);
+    length.is_some_and(|length| {
+        length.constant >= 0 && length.terms.iter().all(|(_, factor)| *factor >= 0)
+    })
+}
+
 /// The requirements that are checked at run time: all those of a model of run-time length, and those on fields of others.
 fn of_run_time(declared: &Declared) -> impl Iterator<Item = &Requirement> {
     let is_of_run_time = declared.is_of_run_time_length();
@@ -132,7 +160,12 @@ fn length_fields(declared: &Declared) -> Vec<&str> {
     for requirement in of_run_time(declared) {
         match requirement {
             Requirement::FieldLength { length, .. } => affines.push(length),
-            Requirement::Turns { start, end, .. } => affines.extend([start, end]),
+            Requirement::Turns {
+                start, end, empty, ..
+            } => {
+                affines.extend([start, end]);
+                affines.extend(empty.iter().flatten());
+            }
             Requirement::Index {
                 nest,
                 place,

@@ -20,7 +20,8 @@ pub enum ModelError {
         /// Its value.
         length: usize,
     },
-    /// A sum over an empty range, or a constraint or an output without sites.
+    /// A sum over a range that ends below its start, or that is empty beyond the ends of the arrays that it stands for; or a
+    /// constraint or an output without sites.
     EmptyRange {
         /// The range of the sum, `i in 0..n-1`; of a constraint or an output, the declaration, `constraint(rod[i in 0..n-1])`.
         ranges: &'static str,
@@ -133,7 +134,11 @@ impl fmt::Display for ModelError {
             }
             Self::EmptyRange { ranges, start, end } => {
                 let sum = sum_over(ranges);
-                write!(f, "{sum}`{ranges}` is empty: its range is {start}..{end}")
+                let fault = match end < start {
+                    true => "ends below its start",
+                    false => "is empty",
+                };
+                write!(f, "{sum}`{ranges}` {fault}: its range is {start}..{end}")
             }
             Self::Index {
                 array,
@@ -242,6 +247,7 @@ impl core::error::Error for ModelError {
 #[doc(hidden)]
 pub mod checks {
     use super::ModelError;
+    use core::cmp::Ordering;
 
     /// Longer than any array, and small enough that sums of several such lengths do not overflow.
     const LONGEST: i64 = 1 << 40;
@@ -277,6 +283,25 @@ pub mod checks {
             return Err(ModelError::EmptyRange { ranges, start, end });
         }
         Ok(())
+    }
+
+    /// Checks that the range of a sum does not end below its start. Where it is empty, loops add zero to the given places
+    /// of this many coordinates, which therefore have to exist.
+    ///
+    /// # Errors
+    /// [`ModelError::EmptyRange`].
+    pub fn terms(
+        ranges: &'static str,
+        start: i64,
+        end: i64,
+        (coordinates, places): (i64, &[i64]),
+    ) -> Result<(), ModelError> {
+        let exist = || places.iter().all(|place| (0..coordinates).contains(place));
+        match start.cmp(&end) {
+            Ordering::Less => Ok(()),
+            Ordering::Equal if exist() => Ok(()),
+            _ => Err(ModelError::EmptyRange { ranges, start, end }),
+        }
     }
 
     /// Checks that an index is within its array.

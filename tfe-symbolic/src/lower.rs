@@ -27,7 +27,7 @@ mod vector;
 
 use crate::check::Model;
 use crate::diagnostic::{Bag, Kind, Span};
-use crate::expr::graph::{ExprId, Graph};
+use crate::expr::graph::{ExprId, Graph, SumRange};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, IndexSymbol, LoopVariable};
 use crate::expr::ordered::SortedMap;
@@ -85,6 +85,10 @@ pub fn lower(model: &Model, context: &Context, bag: &mut Bag) -> Option<Declared
     {
         lowerer.nonlinear_sum(pending.span);
     }
+    let mut formulas: Vec<ExprId> = energy.into_iter().chain(dissipation).collect();
+    formulas.extend(forces.iter().map(|force| force.value));
+    formulas.extend(observables.iter().map(|one| one.value));
+    lowerer.settle_empty_sums(&formulas);
     let requirements = std::mem::take(&mut lowerer.requirements);
     let remarks = std::mem::take(&mut lowerer.remarks);
     let graph = lowerer.graph;
@@ -254,6 +258,8 @@ struct Lowerer<'a> {
     inputs: Vec<bool>,
     /// Requirements on lengths and indices that are not known here.
     requirements: Vec<Requirement>,
+    /// The sums that may have no terms: the places of their requirements, and their ranges.
+    summed: Vec<(usize, SumRange)>,
     /// Unusual properties of the declaration that are not mistakes.
     remarks: Vec<String>,
 }
@@ -286,6 +292,7 @@ impl<'a> Lowerer<'a> {
             fields: vec![false; context.fields.len()],
             inputs: vec![false; model.inputs.len()],
             requirements: Vec::new(),
+            summed: Vec::new(),
             remarks: Vec::new(),
         };
         // A length is a use of the field.

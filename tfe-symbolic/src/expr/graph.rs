@@ -87,8 +87,8 @@ pub struct Graph {
     nodes: Vec<Node>,
     facts: Vec<Facts>,
     known: Interner,
-    /// Whether ranges whose bounds do not depend on outer loops may be assumed not to be empty: models of run-time
-    /// length are checked for that.
+    /// Whether ranges whose bounds do not depend on outer loops may be assumed not to end below their start: models of
+    /// run-time length are checked for that, and for places of what empty ones leave after their loops.
     pub(crate) ranges_are_checked: bool,
 }
 

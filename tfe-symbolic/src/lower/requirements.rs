@@ -2,8 +2,9 @@
 //! evaluated, const parameters where the kernels are compiled for their values.
 
 use super::{Index, Lowerer};
-use crate::expr::graph::SumRange;
-use crate::expr::input::{Affine, IndexSymbol};
+use crate::expr::graph::{ExprId, Graph, Node, SumRange};
+use crate::expr::input::{Affine, IndexSymbol, Input};
+use crate::expr::rewrite::substitute;
 use crate::model::declared::{Extent, Requirement};
 
 impl Lowerer<'_> {
@@ -90,14 +91,30 @@ impl Lowerer<'_> {
         self.require(requirement);
     }
 
-    /// Notes that the range of the innermost sum has to hold something, where it is the same on all turns of the sums around.
+    /// Notes that the range of the sites around has to hold something.
     pub(super) fn require_turns(&mut self, range: &SumRange) {
+        if let Some(requirement) = self.turns_of(range, None) {
+            self.require(requirement);
+        }
+    }
+
+    /// Notes that the range of the innermost sum must not end below its start.
+    pub(super) fn require_order(&mut self, range: &SumRange) {
+        let Some(requirement) = self.turns_of(range, Some(Vec::new())) else {
+            return;
+        };
+        self.require(requirement.clone());
+        let mut known = self.requirements.iter();
+        let at = known.position(|known| *known == requirement);
+        self.summed.extend(at.map(|at| (at, range.clone())));
+    }
+
+    /// What is required of the innermost range, where it is the same on all turns of the sums around.
+    fn turns_of(&self, range: &SumRange, empty: Option<Vec<Affine>>) -> Option<Requirement> {
         let varies = |(symbol, _): &(IndexSymbol, i64)| matches!(symbol, IndexSymbol::Loop(_));
         let mut bounds = range.start.terms.iter().chain(&range.end.terms);
-        let length = range.end.plus_scaled(&range.start, -1);
-        let known = length.and_then(|length| length.as_constant());
-        if bounds.any(varies) || known.is_some_and(|length| length > 0) {
-            return;
+        if bounds.any(varies) || has_turns(range) {
+            return None;
         }
         let index = Affine::symbol(IndexSymbol::Loop(range.variable));
         // As declared: the loop may count from zero.
@@ -106,16 +123,30 @@ impl Lowerer<'_> {
             let own = offset.and_then(|offset| bound.plus_scaled(offset, 1));
             own.unwrap_or_else(|| bound.clone())
         };
-        let requirement = Requirement::Turns {
+        Some(Requirement::Turns {
             ranges: self.stands_in(&index),
             start: own(&range.start),
             end: own(&range.end),
-        };
-        self.require(requirement);
+            empty,
+        })
+    }
+
+    /// Completes what is required of sums, once all formulas are known: programs put all sums over a range into one loop.
+    pub(super) fn settle_empty_sums(&mut self, formulas: &[ExprId]) {
+        if self.summed.is_empty() {
+            return;
+        }
+        let places = places_in_loops(&self.graph, formulas);
+        for (at, range) in std::mem::take(&mut self.summed) {
+            if let Requirement::Turns { empty, .. } = &mut self.requirements[at] {
+                *empty = kept(&places, &range);
+            }
+        }
     }
 
     fn require(&mut self, requirement: Requirement) {
-        // Sums without terms are zero in models of fixed size; loops of others carry parts of a sum to the next turn.
+        // Loops of models of run-time length carry parts of a sum to the next turn, which models of fixed size do where the
+        // range is literal only.
         let is_about_turns = matches!(requirement, Requirement::Turns { .. });
         let is_checked = self.is_of_run_time_length() || !is_about_turns;
         if is_checked && !self.requirements.contains(&requirement) {
@@ -144,6 +175,49 @@ impl Lowerer<'_> {
 /// Whether there are lengths for which an index is below zero.
 pub(super) fn may_be_below_zero(index: &Affine) -> bool {
     index.constant < 0 || index.terms.iter().any(|(_, factor)| *factor < 0)
+}
+
+/// The coordinates, velocities and momenta in the sums of formulas, with the ranges of the sums around that they depend on.
+fn places_in_loops(graph: &Graph, formulas: &[ExprId]) -> Vec<(SumRange, Affine)> {
+    let mut places = Vec::new();
+    for id in graph.reachable(formulas) {
+        let Node::Loop { range, body } = graph.node(id) else {
+            continue;
+        };
+        for input in graph.inputs_of(*body) {
+            if let Input::Coordinate(place) | Input::Velocity(place) | Input::Momentum(place) =
+                input
+                && place.depends_on(range.variable)
+            {
+                places.push((range.clone(), place));
+            }
+        }
+    }
+    places
+}
+
+/// The places at which a loop that adds to the places i and i + 1 leaves, after its last turn, what was meant for the next
+/// one: where the loop has no turns, a zero. `None` if such a place is not the same on all turns of the loops around.
+fn kept(places: &[(SumRange, Affine)], range: &SumRange) -> Option<Vec<Affine>> {
+    let is_same = |other: &SumRange| other.start == range.start && other.end == range.end;
+    let own: Vec<&(SumRange, Affine)> = places.iter().filter(|(own, _)| is_same(own)).collect();
+    let beyond = range.end.plus_scaled(&Affine::constant(1), 1)?;
+    let ends: Vec<Affine> = own
+        .iter()
+        .map(|(own, place)| substitute(place, own.variable, &range.end))
+        .collect();
+    let mut kept = Vec::new();
+    for ((own, place), end) in own.into_iter().zip(&ends) {
+        let next = substitute(place, own.variable, &beyond);
+        if !ends.contains(&next) || kept.contains(end) {
+            continue;
+        }
+        if !end.variables().is_empty() || end.holds_entry() {
+            return None;
+        }
+        kept.push(end.clone());
+    }
+    Some(kept)
 }
 
 /// Whether a range is known to hold something.

@@ -74,7 +74,7 @@ impl Lowerer<'_> {
             at: None,
         });
         if known {
-            self.require_turns(&range);
+            self.require_order(&range);
         }
         let before = self.terms.replace(1);
         let mistakes = self.bag.len();

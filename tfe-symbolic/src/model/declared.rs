@@ -91,7 +91,7 @@ pub enum Requirement {
         /// The length that this index requires; the largest of all decides.
         length: Affine,
     },
-    /// A range is not empty.
+    /// A range does not end below its start; where it has to hold something, it is not empty either.
     Turns {
         /// The range, `i in 0..n-1`.
         ranges: String,
@@ -99,6 +99,9 @@ pub enum Requirement {
         start: Affine,
         /// One past its last value.
         end: Affine,
+        /// Of a sum that may have no terms: the coordinates to which its loops then add zero, which have to exist. `None`
+        /// where the range has to hold something.
+        empty: Option<Vec<Affine>>,
     },
 }
 

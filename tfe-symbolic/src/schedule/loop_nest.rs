@@ -209,7 +209,8 @@ impl Block {
         for at in 0..self.inner.len() {
             let (range, inner) = &mut self.inner[at];
             inner.carry(locals, checked);
-            // If the loop had no turns, its variables would be stored at the places of others.
+            // If the range ended below its start, the variables of its loop would be stored at the places of others. An empty
+            // one ends where it starts, so that they are stored where they came from.
             let bounds = range.start.as_constant().zip(range.end.as_constant());
             let is_known = bounds.is_some_and(|(start, end)| start < end);
             let is_checked = checked && is_of_fields(&range.start) && is_of_fields(&range.end);

@@ -142,9 +142,12 @@ impl Used {
                 self.0.insert(field.clone());
                 self.index(length);
             }
-            Requirement::Turns { start, end, .. } => {
+            Requirement::Turns {
+                start, end, empty, ..
+            } => {
                 self.index(start);
                 self.index(end);
+                empty.iter().flatten().for_each(|place| self.index(place));
             }
         }
     }

@@ -129,6 +129,48 @@ fn a_chain_of_run_time_length() {
     }
 }
 
+/// Sums over ranges that end where they start are zero: what loops would carry to the next turn stays where it is.
+#[test]
+fn sums_without_terms_are_zero() {
+    let chain = "coordinates(q[n]), lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2) \
+        - sum(i in 0..n-1, k/2*(q[i+1]-q[i])^2 + a/3*(q[i+1]-q[i])^3) - sum(i in 1..n, a*(q[i]-q[i-1])^4) \
+        - k*q[0]^2 - k*q[n-1]^4, force(q[i]) = -c[i]*dot(q[i]), force(q[n-1]) = sin(t)";
+    let single = "coordinates(q[1]), lagrangian = m[0]/2*dot(q[0])^2 - k*q[0]^2 - k*q[0]^4, \
+        force(q[0]) = -c[0]*dot(q[0]), force(q[0]) = sin(t)";
+    check(1, 0, chain, single);
+    let beam = "coordinates(q[n]), lagrangian = sum(i in 0..n, m[i]/2*dot(q[i])^2) - k*q[0]^4 - k*(q[n-1] - q[0])^2 \
+        - sum(i in 0..n-2, a*(q[i+2] - 2*q[i+1] + q[i])^4)";
+    let pair = "coordinates(q[2]), lagrangian = m[0]/2*dot(q[0])^2 + m[1]/2*dot(q[1])^2 - k*q[0]^4 - k*(q[1] - q[0])^2";
+    check(2, 0, beam, pair);
+}
+
+/// What is left after a loop needs a place where its range is empty; that of a loop around may be anywhere.
+#[test]
+fn empty_ranges_have_places_for_what_they_leave() {
+    let places = |text: &str, sum: &str| {
+        let requirements = declared(text).requirements;
+        let found = requirements
+            .into_iter()
+            .find_map(|requirement| match requirement {
+                Requirement::Turns { ranges, empty, .. } if ranges == sum => Some(empty),
+                _ => None,
+            });
+        let places = found.expect("a sum")?;
+        let mut places: Vec<String> = places.iter().map(ToString::to_string).collect();
+        places.sort();
+        Some(places.join(", "))
+    };
+    let kinetic = "coordinates(s, q[n]), lagrangian = dot(s)^2/2 + sum(i in 0..n, dot(q[i])^2/2)";
+    let beam = format!("{kinetic} - sum(i in 0..n-2, k*(q[i+2] - 2*q[i+1] + q[i])^2)");
+    assert_eq!(places(&beam, "i in 0..n-2"), Some("n, n-1".to_owned()));
+    assert_eq!(places(&beam, "i in 0..n"), Some(String::new()));
+    // In one loop, though each sum has a single place.
+    let apart = format!("{kinetic} - sum(i in 0..n-1, k*q[i]^4) - sum(j in 0..n-1, k*q[j+1]^6)");
+    assert_eq!(places(&apart, "i in 0..n-1"), Some("n".to_owned()));
+    let windows = format!("{kinetic} - sum(i in 0..n-w, sum(j in 0..w, k*(q[i+j+1] - q[i+j])^4))");
+    assert_eq!(places(&windows, "j in 0..w"), None);
+}
+
 #[test]
 fn pairs_and_several_families() {
     let looped = "coordinates(s, x[n], y[w]), momenta(ps, px[n], py[w]), hamiltonian = ps^2/2 + k*s^2*x[0]^2 \
@@ -326,9 +368,9 @@ fn ranges_that_begin_below_zero_are_told_as_declared() {
     let turns = requirements
         .iter()
         .find_map(|requirement| match requirement {
-            Requirement::Turns { ranges, start, end } if ranges == "i in -1..n-2" => {
-                Some((start.to_string(), end.to_string()))
-            }
+            Requirement::Turns {
+                ranges, start, end, ..
+            } if ranges == "i in -1..n-2" => Some((start.to_string(), end.to_string())),
             _ => None,
         });
     assert_eq!(turns, Some(("-1".to_owned(), "n-2".to_owned())));
