@@ -2,7 +2,7 @@
 //! and the others are a typed error.
 
 use crate::chain::{CHAIN, Chain, THREE};
-use crate::common::distance;
+use crate::common::{distance, larger};
 use tfe::Warning;
 use tfe::family;
 use tfe::prelude::*;
@@ -139,6 +139,50 @@ fn ensembles() {
         assert_eq!(reached.failures().count(), 1, "{end}");
         let expected = many.run(&bad, 0.0..end).expect("runs");
         assert_eq!(reached.into_results(), expected.into_results(), "{end}");
+    }
+}
+
+/// Without neighbours, q̈ = −q.
+#[test]
+fn a_chain_of_one_site_is_an_oscillator() {
+    let single = Chain { n: 1, ..CHAIN };
+    let (q, v, end) = (0.7, 0.2, 3.0_f64);
+    let (sin, cos) = end.sin_cos();
+    let start = single.state([q], [v]);
+    let run = Simulation::new(&single).element(Mixed::<6>).step(0.1);
+    let motion = run.run(start.clone(), 0.0..end).expect("a run");
+    let last = motion.last();
+    let off = larger(
+        (last.q[0] - (q * cos + v * sin)).abs(),
+        (last.v[0] - (v * cos - q * sin)).abs(),
+    );
+    // Six nodes leave rounding errors of thirty steps.
+    assert!(off <= 1e-12, "{off:e}");
+    assert_eq!(motion.outputs().names().len(), 4);
+    let ensemble = Ensemble::new(&single).element(Mixed::<6>).step(0.1);
+    let ends = ensemble.run(std::slice::from_ref(&start), 0.0..end);
+    let ends = ends.expect("an ensemble");
+    assert_eq!(ends.nodes().count(), 1);
+    let off = ends.nodes().map(|node| (node.q[0] - last.q[0]).abs());
+    assert!(off.fold(0.0, larger) <= 1e-13);
+    #[cfg(feature = "sparse")]
+    {
+        let linearised = run.run_linearised(start.clone(), 0.0..end);
+        let matrix = linearised.expect("a run").product();
+        // By columns, of (p, q).
+        let off = distance(matrix.as_slice(), &[cos, sin, -sin, cos]);
+        assert!(off <= 1e-12, "{off:e}");
+        let loss = family::Loss::output_at_end("first");
+        let (_, gradient) = run.gradient(start, 0.0..end, &loss).expect("a gradient");
+        let by_start = gradient.by_start();
+        let off = distance(&[by_start.p[0], by_start.q[0]], &[sin, cos]);
+        assert!(off <= 1e-12 && gradient.by("a") == 0.0, "{off:e}");
+        let rest = single.state([0.0], [0.0]);
+        let orbit = PeriodicOrbit::of(&single)
+            .elements(10)
+            .period(1.0)
+            .guess_from(rest);
+        assert!(orbit.solve().expect("a rest").is_stable());
     }
 }
 

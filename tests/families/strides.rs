@@ -103,7 +103,13 @@ fn words<M: family::Model>(model: &M) -> usize {
 
 #[test]
 fn what_was_passed_is_done() {
-    for (n, expected) in [(2, 0), (STRIDE, 0), (STRIDE + 2, 1), (5 * STRIDE, 4)] {
+    for (n, expected) in [
+        (1, 0),
+        (2, 0),
+        (STRIDE, 0),
+        (STRIDE + 2, 1),
+        (5 * STRIDE, 4),
+    ] {
         let a = 0.25;
         assert_eq!(words(&Chain { n, a }), expected, "{n} sites");
     }

@@ -238,6 +238,15 @@ fn the_radius_of_the_fastest_modes() {
     check_radius(400, 0.0, Element::primal(3), 0.85);
 }
 
+/// One site, which has both walls as neighbours, and two.
+#[test]
+fn the_radii_of_the_shortest_chains() {
+    check_radius(1, 0.0, Element::primal(3), 1.15);
+    check_radius(1, 0.3, Element::mixed(4), 0.3);
+    check_radius(2, 0.0, Element::primal(3), 0.95);
+    check_radius(2, 0.3, Element::mixed(4), 0.3);
+}
+
 /// About eighty modes around ω h = 3.3, with frequencies up to ω h = 4.8.
 #[test]
 fn the_radius_of_one_mode_among_eighty() {
