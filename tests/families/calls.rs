@@ -186,6 +186,49 @@ fn a_chain_of_one_site_is_an_oscillator() {
     }
 }
 
+/// All calls say so before anything is computed.
+#[test]
+fn a_chain_without_sites_is_an_error() {
+    let none = Chain { n: 0, ..CHAIN };
+    let expected = family::ModelError::NoElements { array: "q[n]" };
+    let kind = tfe::RunErrorKind::Family(expected);
+    let empty: [f64; 0] = [];
+    let start = none.state(empty, empty);
+    let (run, span) = (Simulation::new(&none).step(0.1), || 0.0..1.0);
+    let error = run.run(start.clone(), span()).expect_err("refused");
+    assert_eq!(error.kind(), &kind);
+    let mut steps = run.steps(start.clone(), 0.0);
+    assert_eq!(steps.next(), Some(Err(kind.clone())));
+    let mut section = run.section("first", Crossing::Rising, start.clone(), 0.0);
+    assert_eq!(section.next(), Some(Err(kind.clone())));
+    assert_eq!(none.speed(0.0, &[], &[]), Err(expected));
+    assert_eq!(none.wall(0.0, &[], &[]), Err(expected));
+    let ensemble = Ensemble::new(&none).step(0.1);
+    let ends = ensemble.run(std::slice::from_ref(&start), span());
+    let results = ends.expect("an ensemble").into_results();
+    let first = results.first();
+    assert_eq!((results.len(), first), (1, Some(&Err(kind.clone()))));
+    #[cfg(feature = "sparse")]
+    {
+        let linearised = run.run_linearised(start.clone(), span()).map(|_| ());
+        let sensitive = run.run_sensitive(start.clone(), span()).map(|_| ());
+        let loss = family::Loss::output_at_end("first");
+        let gradient = run.gradient(start.clone(), span(), &loss).map(|_| ());
+        for outcome in [linearised, sensitive, gradient] {
+            assert_eq!(outcome.expect_err("refused").kind(), &kind);
+        }
+        let matrix = tfe::stability::transition_matrix(&none, Mixed::<4>, &start, 0.0, 0.1);
+        let message = matrix.expect_err("refused").to_string();
+        assert_eq!(message, expected.to_string());
+        let orbit = PeriodicOrbit::of(&none)
+            .elements(10)
+            .period(1.0)
+            .guess_from(start);
+        let error = orbit.solve().map(|_| ()).expect_err("refused");
+        assert_eq!(error.to_string(), expected.to_string());
+    }
+}
+
 #[cfg(feature = "sparse")]
 #[test]
 fn transition_matrices() {

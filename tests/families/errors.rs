@@ -98,6 +98,27 @@ fn lengths_are_checked_before_anything_else() {
     );
 }
 
+/// An array needs an element also where other coordinates stand beside it.
+#[test]
+fn arrays_beside_single_coordinates_are_not_empty() {
+    #[dynamics(
+        coordinates(s, q[n]),
+        lagrangian = dot(s)^2/2 + sum(i in 0..n, dot(q[i])^2/2 - (q[i] - s)^2/2),
+    )]
+    struct Cart {
+        n: usize,
+    }
+    let expected = family::ModelError::NoElements { array: "q[n]" };
+    let cart = Cart { n: 0 };
+    assert_eq!(
+        (Cart { n: 1 }.check(), cart.check()),
+        (Ok(()), Err(expected))
+    );
+    let error = Simulation::new(&cart).run(cart.state([0.1], [0.0]), 0.0..1.0);
+    let error = error.expect_err("no bodies on the cart");
+    assert_eq!(error.kind(), &RunErrorKind::Family(expected));
+}
+
 /// Sums without terms are zero; ranges that end below their start are not meant, and those that are empty beyond the end of
 /// an array have no place for what their loops leave.
 #[test]
