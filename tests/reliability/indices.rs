@@ -322,6 +322,33 @@ fn lengths_of_vectors_are_checked() {
     assert_eq!(stepper.err(), Some(error));
 }
 
+/// Without terms a sum is zero, and its vectors need no element, also where the range ends below its start.
+#[test]
+fn ranges_that_end_below_their_start_need_no_elements() {
+    #[dynamics(
+        coordinates(x),
+        lagrangian = dot(x)^2/2 - x^2/2 - sum(i in 0..terms-1, c[i]*x^4),
+    )]
+    struct Series {
+        terms: usize,
+        c: Vec<f64>,
+    }
+    for terms in [0, 1] {
+        let c = Vec::new();
+        let series = Series { terms, c };
+        assert_eq!(series.check(), Ok(()), "{terms}");
+        let run = Simulation::new(&series).element(Mixed::<6>).step(0.1);
+        let motion = run.run(series.state([0.5], [0.0]), 0.0..1.0);
+        let end = motion.expect("a run").last().q[0];
+        // Ten steps, with rounding errors only.
+        assert!((end - 0.5 * 1.0_f64.cos()).abs() <= 1e-13, "{end}");
+    }
+    let c = vec![1.0];
+    let error = Series { terms: 0, c }.check().expect_err("no terms");
+    let message = "`c` has 1 elements, but `c[i]` in the sum over `i in 0..terms-1` needs 0";
+    assert_eq!(error.to_string(), message);
+}
+
 /// Where an index is only a number, a sum has its terms below zero, too.
 #[test]
 fn sums_over_indices_that_stand_nowhere_have_all_their_terms() {

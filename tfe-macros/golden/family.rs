@@ -55,16 +55,16 @@ const _: () = {
             __tfe::checks::length("n", self.n)?;
             __tfe::checks::length("w", self.w)?;
             __tfe::checks::elements("q[n]", self.n)?;
-            __tfe::checks::field_length(
-                "m",
-                self.m.len(),
-                &[((self.n as i64), "i", "i in 0..n")],
-            )?;
             __tfe::checks::terms(
                 "i in 0..w",
                 0,
                 (self.w as i64),
                 ((self.n as i64) + 1, &[((self.w as i64) + 1)]),
+            )?;
+            __tfe::checks::field_length(
+                "m",
+                self.m.len(),
+                &[((self.n as i64), "i", "i in 0..n")],
             )?;
             for i in 0..self.w {
                 __tfe::checks::index(("q", "i+1", "i in 0..w"), (i as i64) + 1, self.n)?;

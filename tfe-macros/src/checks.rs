@@ -24,6 +24,8 @@ pub(crate) fn statements(declared: &Declared) -> TokenStream {
         Some(quote!(__tfe::checks::elements(#name, #length)?;))
     });
     let mut lengths: SortedMap<&str, Vec<TokenStream>> = SortedMap::new();
+    // Before the lengths of vectors, which would be below zero for ranges that end below their start.
+    let mut turns = Vec::new();
     let mut rest = Vec::new();
     for requirement in of_run_time(declared) {
         match requirement {
@@ -50,7 +52,7 @@ pub(crate) fn statements(declared: &Declared) -> TokenStream {
                 empty,
             } => {
                 let (start, end) = (indices::signed(start), indices::signed(end));
-                rest.push(match empty {
+                turns.push(match empty {
                     None => quote!(__tfe::checks::turns(#ranges, #start, #end)?;),
                     Some(places) => {
                         let coordinates = indices::signed(&declared.dof);
@@ -101,7 +103,7 @@ pub(crate) fn statements(declared: &Declared) -> TokenStream {
         let field = indices::identifier(name);
         quote!(__tfe::checks::field_length(#name, self.#field.len(), &[#(#uses),*])?;)
     });
-    quote!(#(#longest)* #(#elements)* #(#lengths)* #(#rest)*)
+    quote!(#(#longest)* #(#elements)* #(#turns)* #(#lengths)* #(#rest)*)
 }
 
 /// `check` of an implementation of `Model`; nothing where any fields will do.

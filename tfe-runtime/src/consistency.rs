@@ -355,7 +355,8 @@ pub mod checks {
         i64::try_from(entry).map_or(LONGEST, |entry| entry.min(LONGEST))
     }
 
-    /// Checks that an array field is as long as the largest of its indices requires: (length, index, ranges) of each.
+    /// Checks that an array field is as long as the largest of its indices requires: (length, index, ranges) of each, with
+    /// a length below zero where a range ends below its start and needs nothing.
     ///
     /// # Errors
     /// [`ModelError::FieldLength`].
@@ -365,16 +366,20 @@ pub mod checks {
         uses: &[(i64, &'static str, &'static str)],
     ) -> Result<(), ModelError> {
         match uses.iter().max_by_key(|(expected, ..)| *expected) {
-            Some((expected, index, ranges)) if usize::try_from(*expected) != Ok(length) => {
+            Some((expected, index, ranges)) => {
+                let expected = (*expected).max(0);
+                if usize::try_from(expected) == Ok(length) {
+                    return Ok(());
+                }
                 Err(ModelError::FieldLength {
                     field,
                     length,
-                    expected: *expected,
+                    expected,
                     index,
                     ranges,
                 })
             }
-            _ => Ok(()),
+            None => Ok(()),
         }
     }
 }
