@@ -100,14 +100,27 @@ fn lengths_of_outputs_are_checked() {
         l: vec![1.0],
         ..chain()
     };
-    let error = short.strain(0.0, &Q[..2], &V[..2]).expect_err("no site");
+    let (q, v) = (&Q[..2], &V[..2]);
+    // Two masses have no inner one between them.
+    close(&short.strain(0.0, q, v).expect("one spring"), &[0.1]);
+    assert_eq!(short.power(0.0, q, v), Ok(Vec::new()));
+    let motion = Simulation::new(&short).step(0.1);
+    let motion = motion.run(short.state(q, v), 0.0..0.5).expect("a run");
+    let names = motion.outputs().names().iter().map(ToString::to_string);
+    assert_eq!(names.collect::<Vec<_>>(), ["strain[0]", "length"]);
+    let single = Chain {
+        n: 1,
+        l: Vec::new(),
+        ..chain()
+    };
+    let error = single.strain(0.0, &Q[..1], &V[..1]).expect_err("-1 sites");
     let expected = family::ModelError::EmptyRange {
         ranges: "output(power[site in 1..n-1])",
         start: 1,
-        end: 1,
+        end: 0,
     };
     assert_eq!(error, expected);
-    let message = "`output(power[site in 1..n-1])` is empty: its range is 1..1";
+    let message = "`output(power[site in 1..n-1])` ends below its start: its range is 1..0";
     assert_eq!(error.to_string(), message);
     let error = chain().strain(0.0, &Q[..3], &V).expect_err("a short q");
     assert!(matches!(

@@ -20,8 +20,8 @@ pub enum ModelError {
         /// Its value.
         length: usize,
     },
-    /// A sum over a range that ends below its start, or that is empty beyond the ends of the arrays that it stands for; or a
-    /// constraint or an output without sites.
+    /// A range that ends below its start, or that is empty beyond the ends of the arrays that are summed; or a constraint
+    /// without sites.
     EmptyRange {
         /// The range of the sum, `i in 0..n-1`; of a constraint or an output, the declaration, `constraint(rod[i in 0..n-1])`.
         ranges: &'static str,

@@ -98,7 +98,7 @@ impl Lowerer<'_> {
         }
     }
 
-    /// Notes that the range of the innermost sum must not end below its start.
+    /// Notes that the range of the innermost sum, or of the sites around, must not end below its start.
     pub(super) fn require_order(&mut self, range: &SumRange) {
         let Some(requirement) = self.turns_of(range, Some(Vec::new())) else {
             return;

@@ -136,7 +136,11 @@ impl Lowerer<'_> {
             offset: Affine::default(),
             at: None,
         });
-        self.require_turns(&sites);
+        match argument {
+            "constraint" => self.require_turns(&sites),
+            // Without sites, an output has no column.
+            _ => self.require_order(&sites),
+        }
         let value = formula(self);
         self.indices.pop();
         self.place = None;

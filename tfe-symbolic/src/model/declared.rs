@@ -99,7 +99,7 @@ pub enum Requirement {
         start: Affine,
         /// One past its last value.
         end: Affine,
-        /// Of a sum that may have no terms: the coordinates to which its loops then add zero, which have to exist. `None`
+        /// Of a sum that may have no terms, or sites that may be none: the coordinates to which its loops then add zero, which have to exist. `None`
         /// where the range has to hold something.
         empty: Option<Vec<Affine>>,
     },
