@@ -20,7 +20,7 @@ pub use error::AssemblyError;
 pub use mesh::MeshError;
 
 pub(crate) use chain::{Chain, ClosureMut, DenseMut};
-pub(crate) use control::Control;
+pub(crate) use control::{Control, check_tolerance};
 pub(crate) use convergence::size;
 #[cfg(feature = "sparse")]
 pub(crate) use convergence::{Convergence, Size, sizes};

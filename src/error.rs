@@ -4,7 +4,7 @@ use crate::constraints::write_residuals;
 use crate::driven::InputError;
 use crate::length::{FixedLength, Length};
 use crate::motion::Motion;
-use crate::numbers::Short;
+use crate::numbers::{Short, WrongTolerance};
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::constrained::Residual;
@@ -34,6 +34,11 @@ pub enum RunErrorKind {
     Accuracy {
         /// The value asked for.
         asked: f64,
+    },
+    /// The tolerance of the iteration inside an element is not a number from 0 to below 1.
+    Tolerance {
+        /// The tolerance asked for.
+        tolerance: f64,
     },
     /// No step size was found with which the estimated error is as small as asked. The motion in
     /// [`partial`](RunError::partial) is the best one found.
@@ -351,6 +356,7 @@ impl fmt::Display for RunErrorKind {
                     "the accuracy is {asked}, but it must lie between 0 and 1"
                 )
             }
+            Self::Tolerance { tolerance } => write!(f, "{}", WrongTolerance(*tolerance)),
             Self::AccuracyMissed {
                 asked,
                 estimate,

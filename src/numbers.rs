@@ -17,6 +17,19 @@ impl fmt::Display for Short {
     }
 }
 
+/// The message about a number that [cannot be](is_tolerance) the tolerance of an iteration.
+pub(crate) struct WrongTolerance(pub(crate) f64);
+
+impl fmt::Display for WrongTolerance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "the tolerance is {}, but it must be at least 0 and less than 1: leave `.tolerance(…)` out, or give a small number",
+            Short(self.0)
+        )
+    }
+}
+
 /// A number in a table with a number of decimals, or in scientific notation if these would show little.
 pub(crate) fn digits(number: f64, decimals: usize) -> String {
     if number == 0.0 || (1e-2..1e9).contains(&number.abs()) {
@@ -24,6 +37,12 @@ pub(crate) fn digits(number: f64, decimals: usize) -> String {
     } else {
         format!("{number:.decimals$e}")
     }
+}
+
+/// Whether a number can be the tolerance of an iteration, relative to its result: one, and with it infinity, would accept
+/// any guess, and what is not a number, or below zero, would accept nothing.
+pub(crate) fn is_tolerance(number: f64) -> bool {
+    (0.0..1.0).contains(&number)
 }
 
 /// The larger of two numbers; NaN if one is NaN, which `f64::max` would ignore: `errors.fold(0.0, larger)`.
@@ -64,7 +83,7 @@ pub(crate) fn row_of(table: &[f64], columns: usize, row: usize) -> Option<&[f64]
 
 #[cfg(test)]
 mod tests {
-    use super::{Short, larger, row_of, smaller};
+    use super::{Short, is_tolerance, larger, row_of, smaller};
 
     #[test]
     fn numbers_have_no_rows_of_zeros() {
@@ -75,6 +94,16 @@ mod tests {
         );
         assert_eq!([1e-6, -2.5e300].map(shown), ["1e-6", "-2.5e300"]);
         assert_eq!([f64::NAN, f64::INFINITY].map(shown), ["NaN", "inf"]);
+    }
+
+    #[test]
+    fn tolerances_are_parts_of_one() {
+        for right in [0.0, -0.0, 5e-324, 1e-13, 0.5] {
+            assert!(is_tolerance(right), "{right:e}");
+        }
+        for wrong in [f64::NAN, f64::INFINITY, -f64::INFINITY, -1e-13, 1.0, 1e308] {
+            assert!(!is_tolerance(wrong), "{wrong:e}");
+        }
     }
 
     #[test]

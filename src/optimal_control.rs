@@ -16,6 +16,7 @@ use crate::boundary::{
     BoundaryError, Component, Condition, check_conditions, check_span, straight,
 };
 use crate::driven::place;
+use crate::numbers::is_tolerance;
 use block::Said;
 use nalgebra::DVector;
 use problem::{Ends, Iterate, Problem};
@@ -264,8 +265,8 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
     /// [`Constrained`](OptimalControlErrorKind::Constrained), [`NoCost`](OptimalControlErrorKind::NoCost),
     /// [`UnknownOutput`](OptimalControlErrorKind::UnknownOutput),
     /// [`EndCostOfInput`](OptimalControlErrorKind::EndCostOfInput), [`Input`](OptimalControlErrorKind::Input),
-    /// [`Degree`](OptimalControlErrorKind::Degree) or [`Legendre`](OptimalControlErrorKind::Legendre). If no minimum was
-    /// found from the guess, it is [`Undefined`](OptimalControlErrorKind::Undefined),
+    /// [`Degree`](OptimalControlErrorKind::Degree), [`Tolerance`](OptimalControlErrorKind::Tolerance) or
+    /// [`Legendre`](OptimalControlErrorKind::Legendre). If no minimum was found from the guess, it is [`Undefined`](OptimalControlErrorKind::Undefined),
     /// [`Singular`](OptimalControlErrorKind::Singular), [`Stalled`](OptimalControlErrorKind::Stalled) or
     /// [`NoMinimum`](OptimalControlErrorKind::NoMinimum), and the error holds the last iterate.
     pub fn solve(&self) -> Result<Optimum<N>, OptimalControlError<N>> {
@@ -325,6 +326,11 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
 
     fn check(&self) -> Result<(), OptimalControlErrorKind> {
         (self.model.check()).map_err(OptimalControlErrorKind::Model)?;
+        if !is_tolerance(self.control.tolerance) {
+            return Err(OptimalControlErrorKind::Tolerance {
+                tolerance: self.control.tolerance,
+            });
+        }
         check_span(&self.span)?;
         if self.span.end < self.span.start {
             return Err(OptimalControlErrorKind::Backwards);

@@ -13,6 +13,7 @@ pub(crate) mod reference;
 pub(crate) mod rounds;
 pub(crate) mod subject;
 
+use crate::numbers::is_tolerance;
 use grid::Grid;
 use measure::{Measure, Way};
 use peer::Rival;
@@ -295,12 +296,14 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
     /// # Errors
     /// If no run is possible [`WorkPrecisionError::NoElements`], [`NoSteps`](WorkPrecisionError::NoSteps),
     /// [`Element`](WorkPrecisionError::Element), [`Span`](WorkPrecisionError::Span), [`Step`](WorkPrecisionError::Step),
-    /// [`TooManySteps`](WorkPrecisionError::TooManySteps) or [`Start`](WorkPrecisionError::Start); without a usable
-    /// reference [`ReferenceRun`](WorkPrecisionError::ReferenceRun),
+    /// [`TooManySteps`](WorkPrecisionError::TooManySteps), [`Tolerance`](WorkPrecisionError::Tolerance),
+    /// [`Uncertainty`](WorkPrecisionError::Uncertainty) or [`Start`](WorkPrecisionError::Start); without a usable reference
+    /// [`ReferenceRun`](WorkPrecisionError::ReferenceRun),
     /// [`ReferenceValue`](WorkPrecisionError::ReferenceValue) or
     /// [`ReferenceLength`](WorkPrecisionError::ReferenceLength).
     pub fn run(&self) -> Result<Measurements, WorkPrecisionError> {
         let grids = self.grids()?;
+        self.check_numbers()?;
         self.check_start(&grids)?;
         self.report(format_args!("reference …"));
         let reference = self.source.find(
@@ -384,6 +387,20 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
         let mut grids = grids.collect::<Result<Vec<_>, _>>()?;
         grids.sort_by(|a, b| b.step().total_cmp(&a.step()));
         Ok(grids)
+    }
+
+    /// Refuses tolerances with which iterations would accept anything, or nothing, and an uncertainty that is none.
+    fn check_numbers(&self) -> Result<(), WorkPrecisionError> {
+        let mut tolerances = std::iter::once(&self.control.tolerance).chain(&self.tolerances);
+        if let Some(&tolerance) = tolerances.find(|one| !is_tolerance(**one)) {
+            return Err(WorkPrecisionError::Tolerance { tolerance });
+        }
+        match self.uncertainty {
+            Some(uncertainty) if !(0.0..f64::INFINITY).contains(&uncertainty) => {
+                Err(WorkPrecisionError::Uncertainty { uncertainty })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Refuses a start at which no run can begin.

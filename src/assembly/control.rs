@@ -1,5 +1,8 @@
 //! The tolerance and the iteration limit of assembled problems.
 
+use super::error::AssemblyError;
+use crate::numbers::is_tolerance;
+
 /// The stopping criteria of Newton's method for assembled problems.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Control {
@@ -16,4 +19,19 @@ impl Default for Control {
             max_iterations: 50,
         }
     }
+}
+
+impl Control {
+    /// Refuses a tolerance with which the iteration would accept anything, or nothing.
+    pub(crate) fn check(&self) -> Result<(), AssemblyError> {
+        check_tolerance(self.tolerance)
+    }
+}
+
+/// The same for a tolerance alone.
+pub(crate) fn check_tolerance(tolerance: f64) -> Result<(), AssemblyError> {
+    if is_tolerance(tolerance) {
+        return Ok(());
+    }
+    Err(AssemblyError::Tolerance { tolerance })
 }

@@ -1,5 +1,6 @@
 //! Why an assembled problem has no solution.
 
+use crate::numbers::WrongTolerance;
 use std::fmt;
 use tfe_runtime::{ElementError, LegendreError, ModelError, StepError};
 
@@ -11,6 +12,11 @@ pub enum AssemblyError {
     Model(ModelError),
     /// The element does not exist: an impossible number of nodes, or a quadrature that its family does not have.
     Element(ElementError),
+    /// The tolerance is not a number from 0 to below 1.
+    Tolerance {
+        /// The tolerance given.
+        tolerance: f64,
+    },
     /// The equations of an element could not be linearised.
     Linearise {
         /// The number of the element, from 0.
@@ -58,6 +64,7 @@ impl fmt::Display for AssemblyError {
         match self {
             Self::Model(error) => error.fmt(f),
             Self::Element(error) => error.fmt(f),
+            Self::Tolerance { tolerance } => write!(f, "{}", WrongTolerance(*tolerance)),
             Self::Linearise {
                 element,
                 time,

@@ -278,8 +278,9 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
     /// # Errors
     /// For an invalid problem [`BoundaryError::Span`], [`Count`](BoundaryError::Count),
     /// [`Component`](BoundaryError::Component), [`Twice`](BoundaryError::Twice), [`Value`](BoundaryError::Value),
-    /// [`Mesh`](BoundaryError::Mesh). [`BoundaryError::Assembly`] holds [`AssemblyError::Model`] or
-    /// [`Element`](AssemblyError::Element) for a model or an element that is invalid, and
+    /// [`Mesh`](BoundaryError::Mesh). [`BoundaryError::Assembly`] holds [`AssemblyError::Model`],
+    /// [`Element`](AssemblyError::Element) or [`Tolerance`](AssemblyError::Tolerance) for a model, an element or a
+    /// tolerance that is invalid, and
     /// [`Singular`](AssemblyError::Singular), [`Stalled`](AssemblyError::Stalled),
     /// [`Linearise`](AssemblyError::Linearise), [`Legendre`](AssemblyError::Legendre) or
     /// [`Violated`](AssemblyError::Violated) if no solution is found from the guess.
@@ -338,6 +339,7 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
 
     fn check(&self) -> Result<(), BoundaryError> {
         self.model.check().map_err(AssemblyError::Model)?;
+        self.control.check()?;
         check_span(&self.span)?;
         if self.conditions.len() != 2 * N {
             return Err(BoundaryError::Count {

@@ -84,7 +84,7 @@ where
         let count = self.models.count(starts.len())?;
         let step = self.step_over(&span);
         Mesh::<0>::new(&span, step, &self.breaks, &[])?;
-        self.element.validate().map_err(RunErrorKind::Element)?;
+        self.check_method()?;
         let progress = Progress::new(self.progress, count, "runs");
         Ok(self.run_one_by_one(starts, &span, (count, &progress), &finished))
     }

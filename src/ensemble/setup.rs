@@ -9,9 +9,9 @@ use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::{Node, default_step};
 use crate::progress::Progress;
-use crate::simulation::Watching;
 use crate::simulation::mesh::Mesh;
 use crate::simulation::times::looks_at_ends;
+use crate::simulation::{Watching, check_tolerance};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Mutex;
@@ -132,6 +132,12 @@ impl<M, const N: usize, K, L: Length<N>> Ensemble<'_, M, N, K, L> {
             at_kinks: false,
             progress: false,
         }
+    }
+
+    /// Refuses an element that does not exist, and a tolerance that is none.
+    pub(super) fn check_method(&self) -> Result<(), RunErrorKind> {
+        self.element.validate().map_err(RunErrorKind::Element)?;
+        check_tolerance(self.control.tolerance)
     }
 
     /// The step size of runs over a span.
@@ -305,7 +311,7 @@ where
         let step = self.step_over(&span);
         let at_ends = looks_at_ends(self.element, !M::CONSTRAINTS.is_empty());
         let mesh = Mesh::new(&span, step, &self.breaks, &[])?.whole_unless(at_ends);
-        self.element.validate().map_err(RunErrorKind::Element)?;
+        self.check_method()?;
         let plan = Plan {
             element: self.element,
             control: self.control,

@@ -8,7 +8,6 @@ use super::members::{Members, Models, OneModel, some_starts};
 use super::plan::{Plan, WIDTH, start_of};
 use super::results::{Results, lock, summed, unlock};
 use super::setup::Ensemble;
-use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length, RunTimeLength};
 use crate::progress::Progress;
 use crate::simulation::mesh::Mesh;
@@ -177,7 +176,7 @@ where
         batch: &dyn Fn(usize, usize) -> AnyBatch<'m, M, N, K, L>,
     ) -> Result<EnsembleRun<'m, M, N, K, L>, EnsembleError> {
         let count = self.models.count(starts.len())?;
-        self.element.validate().map_err(RunErrorKind::Element)?;
+        self.check_method()?;
         let mut energies = Vec::with_capacity(count);
         for index in 0..count {
             let (model, start) = (self.models.model(index), start_of(starts, index));
@@ -221,7 +220,7 @@ where
 
     /// Continues all trajectories to the time `end`. A run that has failed keeps its error, and one that an event has
     /// stopped stays at that event. A run whose events have [set](crate::Act::Set) parameters cannot be continued: its
-    /// next result is [`RunErrorKind::Unsupported`].
+    /// next result is [`RunErrorKind::Unsupported`](crate::RunErrorKind::Unsupported).
     ///
     /// If `end` lies on the grid of steps that begins at the first start, and the previous end did, the results have
     /// the same bits as in one run; otherwise the grid begins anew at the time reached. If no step size was set, it is

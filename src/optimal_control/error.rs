@@ -3,6 +3,7 @@
 use super::optimum::Optimum;
 use crate::boundary::BoundaryError;
 use crate::driven::InputError;
+use crate::numbers::WrongTolerance;
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::{ElementError, LegendreError, ModelError};
@@ -81,6 +82,11 @@ pub enum OptimalControlErrorKind {
         degree: usize,
         /// The largest possible degree.
         largest: usize,
+    },
+    /// The tolerance is not a number from 0 to below 1.
+    Tolerance {
+        /// The tolerance given.
+        tolerance: f64,
     },
     /// A momentum of the guess could not be found (Legendre transform).
     Legendre(LegendreError),
@@ -201,6 +207,7 @@ impl fmt::Display for OptimalControlErrorKind {
                 f,
                 "inputs of degree {degree} were asked for, but the points of the element determine degree {largest} at most"
             ),
+            Self::Tolerance { tolerance } => write!(f, "{}", WrongTolerance(*tolerance)),
             Self::Legendre(error) => error.fmt(f),
             Self::Undefined {
                 element,

@@ -5,7 +5,7 @@ use super::orbit::{Verdict, sort, trivial_of};
 use super::phase::Period;
 use super::rest::{Extent, is_at_rest};
 use super::setup::PeriodicOrbit;
-use crate::assembly::MeshError;
+use crate::assembly::{MeshError, check_tolerance};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::linearised::Linearised;
@@ -178,14 +178,14 @@ where
         if self.elements == 0 {
             return Err(MeshError::NoElements.into());
         }
+        check_tolerance(self.tolerance)?;
         let mut period = self.period.checked()?;
         let is_free = matches!(self.period, Period::Guess(_));
         if is_free && M::DEPENDS_ON_TIME {
             return Err(OrbitError::ForcedPeriod);
         }
         self.check_advance()?;
-        let guess = self.guess.clone();
-        let guess = guess.unwrap_or_else(|| self.simulation.model().zero_state());
+        let guess = (self.guess.clone()).unwrap_or_else(|| self.simulation.model().zero_state());
         let mut run = self.run(&guess, period)?;
         let guess = Extent::of_nodes(run.motion());
         self.check_moves(&run, &guess)?;
@@ -246,8 +246,7 @@ where
                 });
             }
         }
-        let residual = self.residual(&run, &scales(run.motion()));
-        let residual = largest(residual.as_slice());
+        let residual = largest(self.residual(&run, &scales(run.motion())).as_slice());
         Err(OrbitError::Stalled {
             residual,
             iterations,

@@ -213,8 +213,9 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
         self
     }
 
-    /// Refuses numbers that are not finite.
+    /// Refuses numbers that are not finite, and tolerances that are none.
     pub(super) fn check_numbers(&self) -> Result<(), OrbitError> {
+        self.control.check()?;
         let phase = match self.phase {
             Phase::Coordinate { value, .. } | Phase::Momentum { value, .. } => value,
             Phase::Orthogonal => 0.0,

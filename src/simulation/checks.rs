@@ -1,6 +1,7 @@
 //! Checks of the start, the impulses and the model before a run.
 
 use crate::error::RunErrorKind;
+use crate::numbers::is_tolerance;
 use tfe_runtime::constrained::{self, Residual};
 use tfe_runtime::family;
 use tfe_runtime::step::Impulse;
@@ -22,6 +23,14 @@ pub(crate) const fn conserves_energies<M: family::Model>() -> bool {
 /// Whether H may be linear in the momenta.
 pub(super) const fn may_be_of_first_order<M: Model<N>, const N: usize>() -> bool {
     matches!(M::FORM, Form::Hamiltonian) && M::FACTS.quadratic_in_z
+}
+
+/// Refuses a tolerance with which iterations would accept anything, or nothing.
+pub(crate) fn check_tolerance(tolerance: f64) -> Result<(), RunErrorKind> {
+    if is_tolerance(tolerance) {
+        return Ok(());
+    }
+    Err(RunErrorKind::Tolerance { tolerance })
 }
 
 /// Refuses start values that are not finite.

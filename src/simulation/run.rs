@@ -1,5 +1,6 @@
 //! Runs over a span, and endless runs.
 
+use super::checks::check_tolerance;
 use super::events::Events;
 use super::follow::Follower;
 use super::kind::{Chosen, Simulated};
@@ -208,10 +209,11 @@ where
 
     /// Checks whether the run can begin at `start`.
     pub(super) fn check_start(&self, start: &L::State) -> Result<(), RunErrorKind> {
-        match &self.refusal {
-            Some(refusal) => Err(refusal.clone()),
-            None => self.model.check_start(start, &self.impulses),
+        if let Some(refusal) = &self.refusal {
+            return Err(refusal.clone());
         }
+        check_tolerance(self.control.tolerance)?;
+        self.model.check_start(start, &self.impulses)
     }
 
     /// Checks the arguments; returns the mesh and the stepper of a run.

@@ -3,6 +3,7 @@
 #[cfg(feature = "charts")]
 use crate::charts::ChartError;
 use crate::error::RunErrorKind;
+use crate::numbers::{Short, WrongTolerance};
 use std::error::Error;
 use std::fmt;
 use std::io;
@@ -38,6 +39,16 @@ pub enum WorkPrecisionError {
         /// The step asked for.
         step: f64,
     },
+    /// A tolerance is not a number from 0 to below 1.
+    Tolerance {
+        /// The tolerance given.
+        tolerance: f64,
+    },
+    /// The uncertainty of the reference is not a finite number of at least zero.
+    Uncertainty {
+        /// The uncertainty given.
+        uncertainty: f64,
+    },
     /// No run can begin at this start.
     Start(RunErrorKind),
     /// The reference run failed with every step size.
@@ -72,24 +83,37 @@ impl fmt::Display for WorkPrecisionError {
             Self::Element(error) => error.fmt(f),
             Self::Span { start, end } => write!(
                 f,
-                "the span {start}..{end} is empty or has an end that is not finite"
+                "the span {}..{} is empty or has an end that is not finite",
+                Short(*start),
+                Short(*end)
             ),
             Self::Step { step } => {
-                write!(f, "a step is {step}, but it must be finite and not zero")
+                write!(
+                    f,
+                    "a step is {}, but it must be finite and not zero",
+                    Short(*step)
+                )
             }
             Self::TooManySteps { span, step } => {
+                let (span, step) = (Short(*span), Short(*step));
                 write!(
                     f,
                     "a span of {span} holds too many steps of {step}: choose longer steps, or a shorter span"
                 )
             }
+            Self::Tolerance { tolerance } => write!(f, "{}", WrongTolerance(*tolerance)),
+            Self::Uncertainty { uncertainty } => write!(
+                f,
+                "the uncertainty of the reference is {}, but it must be finite and at least 0",
+                Short(*uncertainty)
+            ),
             Self::Start(kind) => kind.fmt(f),
             Self::ReferenceRun(kind) => write!(
                 f,
                 "there is nothing to compare with: the reference run failed, {kind}; give a `.reference(…)`"
             ),
             Self::ReferenceValue { time } => {
-                write!(f, "the reference at t = {time} is not finite")
+                write!(f, "the reference at t = {} is not finite", Short(*time))
             }
             Self::ReferenceLength {
                 vector,
@@ -98,7 +122,8 @@ impl fmt::Display for WorkPrecisionError {
                 expected,
             } => write!(
                 f,
-                "the vector {vector} of the reference at t = {time} has {length} elements, but the model has {expected} coordinates"
+                "the vector {vector} of the reference at t = {} has {length} elements, but the model has {expected} coordinates",
+                Short(*time)
             ),
         }
     }

@@ -383,6 +383,18 @@ fn spans_of_all_kinds() {
         element,
         Err(EnsembleError::Run(RunErrorKind::Element(_)))
     ));
+    for wrong in [f64::NAN, f64::INFINITY, -1.0, 1.0] {
+        let ensemble = Ensemble::new(&Quartic).step(0.1).tolerance(wrong);
+        for error in [
+            ensemble.run(&starts, 0.0..1.0).err(),
+            ensemble.begin(&starts, 0.0).err(),
+        ] {
+            assert!(matches!(
+                error,
+                Some(EnsembleError::Run(RunErrorKind::Tolerance { .. }))
+            ));
+        }
+    }
 }
 
 /// The warnings that single runs would have, counted by kind: double pendulums with steps that are far too long, whose

@@ -46,6 +46,10 @@ fn what_makes_no_sense_is_an_error() {
         Kind::Ends(BoundaryError::Span { .. })
     ));
     assert_eq!(kind(sled().span(1.0..0.0)), Kind::Backwards);
+    for wrong in [f64::NAN, f64::INFINITY, -1.0, 1.0] {
+        let told = kind(sled().tolerance(wrong));
+        assert!(matches!(told, Kind::Tolerance { .. }), "{told}");
+    }
     assert_eq!(
         kind(sled().elements(0)),
         Kind::Ends(BoundaryError::Mesh(MeshError::NoElements))

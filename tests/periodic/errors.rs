@@ -366,3 +366,39 @@ fn motions_that_do_not_close_are_no_orbits() {
         error.map(|_| ())
     );
 }
+
+/// With a tolerance that is not a number no iteration ends, with one of a whole any guess is a solution.
+#[test]
+fn tolerances_that_are_none_are_refused() {
+    let projectile = Projectile { g: 9.81 };
+    let cycle = VanDerPol::unit(1.0);
+    let simulation = Simulation::new(&cycle);
+    for tolerance in [f64::NAN, f64::INFINITY, -1.0, 1.0, 1e308] {
+        let arc = BoundaryValue::of(&projectile)
+            .from_to([0.0; 2], [1.0; 2], 0.0..1.0)
+            .tolerance(tolerance)
+            .solve();
+        let orbit = PeriodicOrbit::of(&cycle)
+            .unknown_period(6.6)
+            .guess(|t| ([2.0 * t.cos()], [-2.0 * t.sin()]))
+            .tolerance(tolerance)
+            .solve();
+        let hybrid = PeriodicOrbit::of_simulation(&simulation)
+            .unknown_period(6.6)
+            .guess_from(cycle.state([2.0], [0.0]))
+            .tolerance(tolerance)
+            .solve();
+        assert!(matches!(
+            arc.err(),
+            Some(BoundaryError::Assembly(AssemblyError::Tolerance { .. }))
+        ));
+        for error in [orbit.err(), hybrid.err()] {
+            let error = error.expect("no tolerance");
+            assert!(
+                matches!(error, OrbitError::Assembly(AssemblyError::Tolerance { .. })),
+                "{error}"
+            );
+            assert!(error.to_string().contains("leave `.tolerance(…)` out"));
+        }
+    }
+}

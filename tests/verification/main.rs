@@ -10,4 +10,5 @@ mod equivalences;
 mod invariants;
 mod models;
 mod runs;
+mod settings;
 mod trajectories;

@@ -524,6 +524,14 @@ fn bad_arguments_are_errors() {
         (never.partial().states().len(), never.partial().last().q),
         (1, start.q)
     );
+    for wrong in [f64::NAN, f64::INFINITY, -1e-13, 1.0, 1e308] {
+        let told = kind(simulation().tolerance(wrong), start, 0.0..1.0);
+        let told = told.expect("no tolerance");
+        assert!(matches!(told, RunErrorKind::Tolerance { .. }), "{told}");
+        let told = told.to_string();
+        assert!(told.contains("at least 0 and less than 1") && told.len() < 150);
+    }
+    assert_eq!(kind(simulation().tolerance(0.0), start, 0.0..1.0), None);
     let nowhere = State {
         q: [f64::NAN],
         p: [0.0],

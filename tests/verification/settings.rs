@@ -1,0 +1,45 @@
+//! Settings that make no sense are refused: numbers that are no tolerance, no uncertainty, no limit.
+
+use crate::models::Pendulum;
+use std::time::Duration;
+use tfe::prelude::*;
+use tfe::work_precision::WorkPrecisionError;
+
+const PENDULUM: Pendulum = Pendulum { k: 1.0 };
+
+fn measured() -> WorkPrecision<'static, Pendulum, State<1>> {
+    let start = PENDULUM.state([1.0], [0.0]);
+    WorkPrecision::new(&PENDULUM, start, 0.0..1.0)
+        .element(Mixed::<3>)
+        .steps([0.1])
+        .repeat_for(Duration::ZERO)
+}
+
+/// A tolerance that is not a number accepts nothing, one of a whole any guess; an uncertainty below zero counted as its
+/// magnitude.
+#[test]
+fn diagrams_refuse_tolerances_and_uncertainties_that_are_none() {
+    use WorkPrecisionError as E;
+    for wrong in [f64::NAN, f64::INFINITY, -1.0, 1.0] {
+        for problem in [
+            measured().tolerance(wrong),
+            measured().tolerances([1e-6, wrong]),
+        ] {
+            let told = problem.run().unwrap_err();
+            assert!(matches!(told, E::Tolerance { .. }), "{told}");
+        }
+    }
+    for wrong in [f64::NAN, f64::INFINITY, -1.0] {
+        let told = measured().reference_uncertainty(wrong).run().unwrap_err();
+        assert!(matches!(told, E::Uncertainty { .. }), "{told}");
+    }
+    let start = PENDULUM.state([1.0], [0.0]);
+    let long = WorkPrecision::new(&PENDULUM, start, 0.0..1e300)
+        .element(Mixed::<3>)
+        .steps([1e-300]);
+    let told = long.run().unwrap_err().to_string();
+    assert!(
+        told.contains("a span of 1e300 holds too many steps of 1e-300"),
+        "{told}"
+    );
+}
