@@ -1,7 +1,11 @@
 //! Meshes of assembled problems, relative to their span.
 
+use crate::numbers::Short;
 use std::fmt;
 use tfe_runtime::condenser::Direction;
+
+/// The largest number of elements. A larger one is a mistake: the matrices of so many would need several gigabytes.
+const MOST_ELEMENTS: usize = 10_000_000;
 
 /// The nodes of a mesh as fractions of its span, from 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +18,9 @@ impl Mesh {
     pub(crate) fn new(elements: usize, weights: &[f64]) -> Result<Self, MeshError> {
         if elements == 0 {
             return Err(MeshError::NoElements);
+        }
+        if elements > MOST_ELEMENTS {
+            return Err(MeshError::TooManyElements { elements });
         }
         if weights.is_empty() {
             let fractions = (0..=elements).map(|e| e as f64 / elements as f64).collect();
@@ -38,7 +45,15 @@ impl Mesh {
         }
         // Rounding may leave the sum slightly off 1.
         fractions[elements] = 1.0;
-        Ok(Self { fractions })
+        let mesh = Self { fractions };
+        match (0..elements).find(|element| mesh.share(*element) <= 0.0) {
+            Some(element) => Err(MeshError::TooShort {
+                element,
+                weight: weights[element],
+                total,
+            }),
+            None => Ok(mesh),
+        }
     }
 
     /// The mesh with every element halved.
@@ -151,6 +166,21 @@ impl Mesh {
 pub enum MeshError {
     /// The number of elements is zero.
     NoElements,
+    /// There are more than ten million elements.
+    TooManyElements {
+        /// The number asked for.
+        elements: usize,
+    },
+    /// A weight of a graded mesh is so small beside the sum of all that its element has no length: a rounding of the time
+    /// is longer.
+    TooShort {
+        /// The index of the element.
+        element: usize,
+        /// Its weight.
+        weight: f64,
+        /// The sum of all weights.
+        total: f64,
+    },
     /// A weight of a graded mesh is not positive, or the sum of the weights is not finite.
     Weight {
         /// The index of the element.
@@ -164,9 +194,24 @@ impl fmt::Display for MeshError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoElements => f.write_str("there must be at least one element"),
+            Self::TooManyElements { elements } => write!(
+                f,
+                "{elements} elements are too many: at most {MOST_ELEMENTS} can be solved together"
+            ),
+            Self::TooShort {
+                element,
+                weight,
+                total,
+            } => write!(
+                f,
+                "element {element} of the graded mesh has the weight {} of {} in all, so that its length vanishes in rounding: give a larger weight, or leave the element out",
+                Short(*weight),
+                Short(*total)
+            ),
             Self::Weight { element, weight } => write!(
                 f,
-                "element {element} of the graded mesh has the weight {weight}; weights must be positive, with a finite sum"
+                "element {element} of the graded mesh has the weight {}; weights must be positive, with a finite sum",
+                Short(*weight)
             ),
         }
     }
@@ -209,11 +254,25 @@ mod tests {
                 "{told}"
             );
         }
+        let many = Mesh::new(usize::MAX, &[]).expect_err("no memory");
+        let told = "elements are too many: at most 10000000 can be solved together";
+        assert_eq!(many.to_string(), format!("{} {told}", usize::MAX));
+        // A weight that vanishes in the sum.
+        for (weights, place) in [([1.0, 1e-20, 1.0], 1), ([1e-320, 1.0, 1e300], 0)] {
+            let told = Mesh::new(3, &weights).expect_err("no length");
+            assert!(
+                matches!(told, MeshError::TooShort { element, .. } if element == place),
+                "{told}"
+            );
+            assert!(!told.to_string().contains("000000"), "{told}");
+        }
+        assert!(Mesh::new(2, &[1e-20, 1.0]).is_ok());
         // Only the sum overflows.
         let told = Mesh::new(3, &[1.0, 1e308, 9e307]).expect_err("no finite sum");
         assert!(
             matches!(told, MeshError::Weight { element: 1, .. }),
             "{told}"
         );
+        assert!(told.to_string().contains("the weight 1e308;"), "{told}");
     }
 }

@@ -5,6 +5,7 @@ use crate::assembly::{
     Solution,
 };
 use crate::motion::{Motion, Node};
+use crate::numbers::Short;
 use crate::periodic::along_motion;
 use crate::simulation::Simulation;
 use nalgebra::DMatrix;
@@ -48,10 +49,11 @@ pub(crate) struct Condition {
     pub(crate) value: f64,
 }
 
-/// Checks that a span has a nonzero finite length.
+/// Checks that a span has a finite length, and one that can be divided.
 pub(crate) fn check_span(span: &Range<f64>) -> Result<(), BoundaryError> {
     let Range { start, end } = *span;
-    if start.is_finite() && end.is_finite() && start != end {
+    // Also the difference of two finite times may overflow; one below all normal numbers is lost when it is divided.
+    if (end - start).is_normal() {
         return Ok(());
     }
     Err(BoundaryError::Span { start, end })
@@ -467,7 +469,7 @@ impl<M: Model<N>, const N: usize> BoundaryMotion<'_, M, N> {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BoundaryError {
-    /// The span was not given, is empty, or is not finite.
+    /// The span was not given, is empty, or is not finite; or its length overflows or is below all normal numbers.
     Span {
         /// The start of the span.
         start: f64,
@@ -521,7 +523,9 @@ impl fmt::Display for BoundaryError {
         match self {
             Self::Span { start, end } => write!(
                 f,
-                "the span {start}..{end} is missing, empty or not finite: give it with `.span(t0..t1)` or with the values at both ends"
+                "the span {}..{} is missing, empty or not finite: give it with `.span(t0..t1)` or with the values at both ends",
+                Short(*start),
+                Short(*end)
             ),
             Self::Count { needed, given } => {
                 write!(

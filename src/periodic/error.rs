@@ -2,6 +2,7 @@
 
 use crate::assembly::{AssemblyError, MeshError};
 use crate::error::RunErrorKind;
+use crate::numbers::Short;
 use crate::periodic_schur::PeriodicSchurError;
 use std::fmt;
 use tfe_runtime::{LegendreError, StepError};
@@ -12,7 +13,7 @@ use tfe_runtime::{LegendreError, StepError};
 pub enum OrbitError {
     /// No period was given, neither as a known value nor as a guess.
     NoPeriod,
-    /// The period, as given or as found, is not positive.
+    /// The period, as given or as found, is not a positive number, or is below all normal numbers.
     Period {
         /// The period given or found.
         period: f64,
@@ -108,8 +109,15 @@ impl fmt::Display for OrbitError {
             Self::NoPeriod => {
                 f.write_str("no period is set: give `.period(T)`, or `.unknown_period(guess)` for an autonomous model")
             }
-            Self::Period { period } => write!(f, "the period is {period}, it must be positive"),
-            Self::Number { what, value } => write!(f, "the {what} is {value}, it must be finite"),
+            Self::Period { period } => write!(
+                f,
+                "the period is {}, it must be positive, finite and at least {:.1e}",
+                Short(*period),
+                f64::MIN_POSITIVE
+            ),
+            Self::Number { what, value } => {
+                write!(f, "the {what} is {}, it must be finite", Short(*value))
+            }
             Self::ForcedPeriod => f.write_str(
                 "the model depends on time, so its orbits have the period of the forcing: give it with `.period(T)`",
             ),
@@ -121,11 +129,13 @@ impl fmt::Display for OrbitError {
             Self::Guess(error) => write!(f, "the run for the first guess failed: {error}"),
             Self::Run(error) => write!(f, "a run in the search for the orbit failed: {error}"),
             Self::Stopped { time } => {
+                let time = Short(*time);
                 write!(f, "an event ends the motion at t = {time}, before a period has passed: let it go on there, for example with `Act::Restart`")
             }
             Self::ParameterLeft { parameter, value } => write!(
                 f,
-                "events leave `{parameter}` at {value} after a period, which is not its value at the start: let an event of the period set it back"
+                "events leave `{parameter}` at {} after a period, which is not its value at the start: let an event of the period set it back",
+                Short(*value)
             ),
             Self::Stalled {
                 residual,

@@ -37,7 +37,8 @@ impl Period {
     pub(super) fn checked(self) -> Result<f64, OrbitError> {
         match self {
             Self::Missing => Err(OrbitError::NoPeriod),
-            Self::Known(period) | Self::Guess(period) if period.is_finite() && period > 0.0 => {
+            // Below all normal numbers a period would be lost when it is divided.
+            Self::Known(period) | Self::Guess(period) if period.is_normal() && period > 0.0 => {
                 Ok(period)
             }
             Self::Known(period) | Self::Guess(period) => Err(OrbitError::Period { period }),

@@ -15,11 +15,11 @@ fn orbits_that_are_ill_posed() {
     let circle = |t: f64| ([2.0 * t.cos()], [-2.0 * t.sin()]);
     let problem = || PeriodicOrbit::of(&cycle).guess(circle);
     assert!(matches!(problem().solve(), Err(OrbitError::NoPeriod)));
-    for period in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(
-            problem().unknown_period(period).solve(),
-            Err(OrbitError::Period { .. })
-        ));
+    for period in [0.0, -1.0, 5e-324, f64::NAN, f64::INFINITY] {
+        let told = problem().unknown_period(period).solve().err();
+        let told = told.expect("no period");
+        assert!(matches!(told, OrbitError::Period { .. }), "{told}");
+        assert!(told.to_string().len() < 80, "{told}");
     }
     let error = PeriodicOrbit::of(&forced).unknown_period(4.0).solve();
     assert!(matches!(error, Err(OrbitError::ForcedPeriod)));
@@ -312,6 +312,41 @@ fn boundary_values_that_are_ill_posed() {
         .solve()
         .expect("an arc");
     assert!((solved.start().q[1] + 2.0 + 0.5 * 9.81).abs() < 1e-13);
+}
+
+/// Lengths that overflow or vanish, and more elements than any memory holds: panics, or a step of 0.
+#[test]
+fn spans_and_meshes_of_absurd_sizes() {
+    let projectile = Projectile { g: 9.81 };
+    let cycle = VanDerPol::unit(1.0);
+    let arc = |span| BoundaryValue::of(&projectile).from_to([0.0; 2], [1.0; 2], span);
+    for span in [-1e308..1e308, 0.0..5e-324, 0.0..f64::NAN] {
+        let told = arc(span).solve().err().expect("no span");
+        assert!(matches!(told, BoundaryError::Span { .. }), "{told}");
+        assert!(told.to_string().len() < 140, "{told}");
+    }
+    let orbit = || PeriodicOrbit::of(&cycle).unknown_period(6.6);
+    for elements in [usize::MAX, usize::MAX / 2, 1 << 40] {
+        let arc = arc(0.0..1.0).elements(elements).solve().err();
+        assert_eq!(
+            arc,
+            Some(BoundaryError::Mesh(MeshError::TooManyElements { elements }))
+        );
+        let orbit = orbit().elements(elements).solve().err();
+        assert_eq!(
+            orbit,
+            Some(OrbitError::Mesh(MeshError::TooManyElements { elements }))
+        );
+    }
+    let vanishing = MeshError::TooShort {
+        element: 1,
+        weight: 1e-20,
+        total: 2.0,
+    };
+    let arc = arc(0.0..1.0).graded([1.0, 1e-20, 1.0]).solve().err();
+    assert_eq!(arc, Some(BoundaryError::Mesh(vanishing)));
+    let orbit = orbit().graded([1.0, 1e-20, 1.0]).solve().err();
+    assert_eq!(orbit, Some(OrbitError::Mesh(vanishing)));
 }
 
 /// An undamped oscillator forced with its own period has no periodic orbit. The errors of elements in its period, 4e-6
