@@ -276,14 +276,12 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         let mesh = Mesh::new(self.elements, &self.weights).map_err(BoundaryError::Mesh)?;
         let table = SchemeTable::new(self.element)?;
         let scheme = table.view();
-        let coefficients = self.degree.map_or(scheme.rates(), |degree| degree + 1);
-        if coefficients > scheme.points() {
-            return Err(OptimalControlErrorKind::Degree {
-                degree: coefficients - 1,
-                largest: scheme.points() - 1,
-            }
-            .into());
+        let degree = self.degree.unwrap_or(scheme.rates() - 1);
+        let largest = scheme.points() - 1;
+        if degree > largest {
+            return Err(OptimalControlErrorKind::Degree { degree, largest }.into());
         }
+        let coefficients = degree + 1;
         let sizes = Sizes::new(M::FORM, N, &scheme, M::INPUTS.len(), coefficients);
         let length = self.span.end - self.span.start;
         let places = (0..self.elements).map(|e| mesh.place(e, self.span.start, length));

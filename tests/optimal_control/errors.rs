@@ -97,6 +97,13 @@ fn what_makes_no_sense_is_an_error() {
             largest: 2
         }
     );
+    assert_eq!(
+        kind(sled().input_degree(usize::MAX)),
+        Kind::Degree {
+            degree: usize::MAX,
+            largest: 2
+        }
+    );
     assert!(matches!(
         kind(sled().element(Element::mixed(40))),
         Kind::Element(_)
