@@ -157,7 +157,8 @@ impl Convergence {
 
     fn stalled(&self) -> AssemblyError {
         AssemblyError::Stalled {
-            iterations: self.iterations,
+            // A step that is refused counts twice, and may exceed the limit.
+            iterations: self.iterations.min(self.control.max_iterations),
             correction: self.size.whole,
             tolerance: self.control.tolerance,
         }
@@ -304,7 +305,7 @@ fn own_sizes(components: &[Largest], matrix: &[f64]) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Control, Convergence, Size, sizes};
+    use super::{AssemblyError, Control, Convergence, Size, sizes};
 
     /// Two coordinates with their corrections.
     fn size(q: [f64; 2], [first, second]: [f64; 2]) -> Size {
@@ -346,5 +347,26 @@ mod tests {
         let wild = [0.9, 0.8, 0.7, 0.9, 0.8, 0.7, 0.9, 0.8, 0.7];
         let solved = [5e-3, 1e-4, 1e-9];
         check([1e11, 1.0], wild.into_iter().chain(solved), 11);
+    }
+
+    /// The limit is what the message says, also where the last step was refused.
+    #[test]
+    fn no_more_iterations_are_told_than_the_limit() {
+        let control = Control {
+            max_iterations: 3,
+            ..Control::default()
+        };
+        let far = size([1.0, 1.0], [0.5, 0.5]);
+        let mut convergence = Convergence::new(control, far);
+        for _ in 0..2 {
+            assert!(convergence.accepts(true, far));
+        }
+        assert!(!convergence.accepts(false, far));
+        convergence.halve().expect("a shorter step");
+        let told = convergence.go_on().expect_err("the limit");
+        assert!(
+            matches!(told, AssemblyError::Stalled { iterations: 3, .. }),
+            "{told}"
+        );
     }
 }

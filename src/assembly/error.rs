@@ -1,6 +1,6 @@
 //! Why an assembled problem has no solution.
 
-use crate::numbers::WrongTolerance;
+use crate::numbers::{Short, WrongTolerance};
 use std::fmt;
 use tfe_runtime::{ElementError, LegendreError, ModelError, StepError};
 
@@ -45,7 +45,7 @@ pub enum AssemblyError {
     /// The assembled equations are singular: there is no solution, or there are many close to each other (for example
     /// a family of periodic orbits, or ends that are conjugate points).
     Singular {
-        /// Iterations done.
+        /// Corrections made before the equations were found to be singular.
         iterations: u32,
     },
     /// Newton's method did not converge.
@@ -69,7 +69,7 @@ impl fmt::Display for AssemblyError {
                 element,
                 time,
                 source,
-            } => write!(f, "element {element}, at t = {time}: {source}"),
+            } => write!(f, "element {element}, at t = {}: {source}", Short(*time)),
             Self::Legendre(error) => error.fmt(f),
             Self::Violated {
                 constraint,
@@ -78,13 +78,19 @@ impl fmt::Display for AssemblyError {
                 residual,
             } => write!(
                 f,
-                "the solution violates the constraint `{constraint}` at t = {time}: {} off by {residual:.1e} of the largest; dependent constraints contradict each other, \
+                "the solution violates the constraint `{constraint}` at t = {}: {} off by {residual:.1e} of the largest; dependent constraints contradict each other, \
                  the position is singular, or the values given at the ends violate the constraints",
+                Short(*time),
                 if *position { "position" } else { "velocity" }
             ),
             Self::Singular { iterations } => write!(
                 f,
-                "the assembled equations are singular after {iterations} iterations: there is no solution near the guess, or a whole family of them; another guess, or another span or period, may help"
+                "the assembled equations are singular {}: there is no solution near the guess, or a whole family of them; another guess, or another span or period, may help",
+                match iterations {
+                    0 => "at the guess".to_owned(),
+                    1 => "after one iteration".to_owned(),
+                    _ => format!("after {iterations} iterations"),
+                }
             ),
             Self::Stalled {
                 iterations,

@@ -255,6 +255,11 @@ impl<const N: usize> Assembly<N> {
         self.iterations
     }
 
+    /// The number of corrections before the last linearisation, which is what a limit of iterations counts.
+    pub(super) fn corrections(&self) -> u32 {
+        self.iterations.saturating_sub(1)
+    }
+
     /// The work of the iterations.
     pub(crate) fn statistics(&self) -> Statistics {
         let mut statistics = *self.condenser.statistics();
@@ -371,9 +376,8 @@ impl<const N: usize> Assembly<N> {
     }
 
     fn solve_chain(&mut self) -> Result<(), AssemblyError> {
-        self.chain.solve().map_err(|_| AssemblyError::Singular {
-            iterations: self.iterations,
-        })
+        let iterations = self.corrections();
+        (self.chain.solve()).map_err(|_| AssemblyError::Singular { iterations })
     }
 
     /// The last linear system.

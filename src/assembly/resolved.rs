@@ -78,7 +78,7 @@ impl<const N: usize> Assembly<N> {
             return Ok(());
         }
         Err(AssemblyError::Singular {
-            iterations: self.iterations(),
+            iterations: self.corrections(),
         })
     }
 }

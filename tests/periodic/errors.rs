@@ -142,6 +142,14 @@ fn orbits_that_do_not_exist() {
         (stalled, "begin nearer to the orbit"),
         (
             AssemblyError::Singular { iterations: 7 }.into(),
+            "after 7 iterations",
+        ),
+        (
+            AssemblyError::Singular { iterations: 0 }.into(),
+            "singular at the guess",
+        ),
+        (
+            AssemblyError::Singular { iterations: 1 }.into(),
             "another guess",
         ),
     ] {
@@ -295,8 +303,9 @@ fn boundary_values_that_are_ill_posed() {
         error,
         Err(BoundaryError::Mesh(MeshError::NoElements))
     ));
-    // px is conserved: giving it at both ends does not determine x.
+    // px is conserved: giving it at both ends does not determine x, whatever the guess and the limit.
     let error = problem()
+        .max_iterations(0)
         .span(0.0..1.0)
         .start(Component::Momentum(0), 1.0)
         .end(Component::Momentum(0), 1.0)
@@ -305,7 +314,9 @@ fn boundary_values_that_are_ill_posed() {
         .solve();
     assert!(matches!(
         error,
-        Err(BoundaryError::Assembly(AssemblyError::Singular { .. }))
+        Err(BoundaryError::Assembly(AssemblyError::Singular {
+            iterations: 0
+        }))
     ));
     let solved = three()
         .end(Component::Momentum(1), 2.0)

@@ -191,7 +191,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         if is_left {
             return Ok(());
         }
-        let iterations = self.iterations();
+        let iterations = self.corrections();
         Err(AssemblyError::Singular { iterations }.into())
     }
 
@@ -236,7 +236,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         self.statistics.steps += places.len() as u64;
         self.statistics.factorizations += places.len() as u64;
         self.close(chain)?;
-        let iterations = self.iterations();
+        let iterations = self.corrections();
         chain
             .solve()
             .map_err(|_| AssemblyError::Singular { iterations }.into())
@@ -276,8 +276,10 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         matrix
     }
 
-    fn iterations(&self) -> u32 {
-        u32::try_from(self.statistics.newton_iterations).unwrap_or(u32::MAX)
+    /// The number of corrections before the last linearisation.
+    fn corrections(&self) -> u32 {
+        let linearised = self.statistics.newton_iterations;
+        u32::try_from(linearised.saturating_sub(1)).unwrap_or(u32::MAX)
     }
 
     /// Writes the conditions of periodicity, phase and energy.
