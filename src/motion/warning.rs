@@ -85,7 +85,7 @@ pub enum Warning {
         /// The length of that element; negative in a run backwards.
         step: f64,
         /// The largest difference between the two results, relative to the extent of the motion (largest minus smallest
-        /// value of coordinates and of momenta).
+        /// value of coordinates and of momenta); infinite if shorter elements fail.
         distance: f64,
         /// The number of such elements that were found.
         count: usize,
@@ -153,14 +153,23 @@ impl fmt::Display for Warning {
                 step,
                 distance,
                 ..
-            } => write!(
-                f,
-                "the step {} at t = {} does not resolve the motion: shorter steps end elsewhere by {} of the extent of the motion; \
-                 take a shorter step or an element with more nodes",
-                Short(*step),
-                Short(*time),
-                part(*distance)
-            ),
+            } => {
+                let (step, time) = (Short(*step), Short(*time));
+                write!(
+                    f,
+                    "the step {step} at t = {time} does not resolve the motion: "
+                )?;
+                if distance.is_infinite() {
+                    f.write_str("shorter steps fail there")?;
+                } else {
+                    let part = part(*distance);
+                    write!(
+                        f,
+                        "shorter steps end elsewhere by {part} of the extent of the motion"
+                    )?;
+                }
+                f.write_str("; take a shorter step or an element with more nodes")
+            }
         }
     }
 }
@@ -226,6 +235,6 @@ mod tests {
         assert!(unresolved(0.051).contains("at t = 1e-9 does not"));
         assert!(unresolved(0.051).contains("elsewhere by 0.05 of"));
         assert!(unresolved(1e40).contains("elsewhere by 1.0e40 of"));
-        assert!(unresolved(f64::INFINITY).contains("elsewhere by inf of"));
+        assert!(unresolved(f64::INFINITY).contains("shorter steps fail there; take"));
     }
 }

@@ -130,6 +130,10 @@ where
         if const { M::FACTS.linear } || self.again.chosen.control.solve == Solve::Trusting {
             return;
         }
+        // Parts of such an element have lost digits of their length, or are of length zero.
+        if !(examined.h / f64::from(MOST_PARTS)).is_normal() {
+            return;
+        }
         if let Some(asked) = self.comparisons.asked(statistics, &examined) {
             self.compare(asked, &examined);
         }
@@ -171,6 +175,10 @@ where
         self.comparisons.found.warning(halves::<N, L>(last))
     }
 }
+
+/// The numbers of shorter elements that an element is compared with, and one that was cut.
+const PARTS: u32 = 3;
+const MOST_PARTS: u32 = 9;
 
 /// A comparison that is to be made.
 #[derive(Clone, Copy)]
@@ -217,7 +225,7 @@ impl Choice {
         Asked {
             is_due: !is_quick && self.takes(is_cut, coordinates, compared),
             // If an element was too long for its solution to be verified, a third of it may be, too.
-            parts: if is_cut { 9 } else { 3 },
+            parts: if is_cut { MOST_PARTS } else { PARTS },
         }
     }
 
@@ -400,8 +408,15 @@ struct Extent {
 }
 
 impl Extent {
+    /// The least range of a number relative to its size: differences of a few roundings are no motion.
+    const ROUNDINGS: f64 = 256.0 * f64::EPSILON;
+
     fn of(Bounds { least, largest }: &Bounds) -> Self {
         let ends = || least.iter().zip(largest);
+        let range = |(least, largest): (&f64, &f64)| {
+            let size = largest.abs().max(least.abs());
+            (largest - least).max(Self::ROUNDINGS * size)
+        };
         let momenta = ends().skip(least.len() / 2);
         let mut weights: Vec<f64> = momenta
             .map(|(least, largest)| largest.abs().max(least.abs()))
@@ -410,24 +425,69 @@ impl Extent {
             weights.fill(1.0);
         }
         Self {
-            range: ends().map(|(least, largest)| largest - least).collect(),
+            range: ends().map(range).collect(),
             weights,
         }
     }
 
-    /// A difference relative to the extent. Differences of positions are weighted with momenta, and those of momenta
-    /// with positions, so that units do not matter.
+    /// A difference relative to the extent; infinite only if there is no end to compare with. Differences of positions
+    /// are weighted with momenta, and those of momenta with positions, so that units do not matter.
     fn part(&self, off: &[f64]) -> f64 {
+        if off.contains(&f64::INFINITY) {
+            return f64::INFINITY;
+        }
         let relative = |weights: &[f64], off: &[f64], range: &[f64]| {
             let (mut distance, mut way) = (0.0, 0.0);
             for (weight, (off, range)) in weights.iter().zip(off.iter().zip(range)) {
                 distance += weight * off.abs();
                 way += weight * range;
             }
-            if distance == 0.0 { 0.0 } else { distance / way }
+            // An extent below all normal numbers has no digits to compare with.
+            if way < f64::MIN_POSITIVE {
+                return 0.0;
+            }
+            let part: f64 = distance / way;
+            if part.is_infinite() { f64::MAX } else { part }
         };
         let coordinates = off.len() / 2;
         let ((q, p), (of_q, of_p)) = (off.split_at(coordinates), self.range.split_at(coordinates));
         relative(&self.weights, q, of_q).max(relative(of_q, p, of_p))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Bounds, Extent, Found};
+
+    /// The extent of a motion between two states, of one coordinate.
+    fn extent([q, p]: [[f64; 2]; 2]) -> Extent {
+        let mut bounds = Bounds::of([&q[..1], &p[..1]]);
+        bounds.include([&q[1..], &p[1..]]);
+        Extent::of(&bounds)
+    }
+
+    /// Where the range of a coordinate is a rounding of it, a difference of two roundings is no motion; by a tenth of
+    /// the range it is one.
+    #[test]
+    fn differences_are_compared_with_the_motion_and_not_with_roundings() {
+        let still = extent([[1.0, 1.0], [2.0, 2.0]]);
+        assert!(still.part(&[2.0 * f64::EPSILON, 0.0]) < Found::MOST);
+        assert!(still.part(&[0.0, 4.0 * f64::EPSILON]) < Found::MOST);
+        let moving = extent([[-1.0, 1.0], [0.0, 2.0]]);
+        assert!((moving.part(&[0.2, 0.0]) - 0.1).abs() < 1e-15);
+        // 5e-324 weighted with 5e-324 is zero.
+        let least = f64::from_bits(1);
+        let tiny = extent([[0.0, least], [0.0, least]]);
+        assert_eq!(tiny.part(&[least, least]), 0.0);
+    }
+
+    /// Also beside a momentum that is zero, and a difference too large for a ratio is not told as a failure.
+    #[test]
+    fn only_shorter_elements_that_fail_differ_by_infinity() {
+        let moving = extent([[-1.0, 1.0], [0.0, 0.0]]);
+        assert_eq!(moving.part(&[f64::INFINITY; 2]), f64::INFINITY);
+        let small = extent([[0.0, 1e-150], [0.0, 1e-150]]);
+        assert_eq!(small.part(&[1e300, 0.0]), f64::MAX);
+        assert!(small.part(&[f64::NAN, f64::NAN]).is_nan());
     }
 }

@@ -1,4 +1,4 @@
-//! Settings that make no sense are refused: numbers that are no tolerance, no uncertainty, no limit.
+//! Settings of absurd sizes: what makes no sense is refused, and what is only small gives no false warning.
 
 use crate::models::Pendulum;
 use std::time::Duration;
@@ -42,4 +42,17 @@ fn diagrams_refuse_tolerances_and_uncertainties_that_are_none() {
         told.contains("a span of 1e300 holds too many steps of 1e-300"),
         "{told}"
     );
+}
+
+/// Thirds of the shortest step that there is are of length zero: that shorter steps fail says nothing about the motion.
+#[test]
+fn the_shortest_steps_do_not_fail_to_resolve_a_motion() {
+    for step in [5e-324, 1e-310, 1e-300] {
+        let motion = Simulation::new(&PENDULUM)
+            .step(step)
+            .run(PENDULUM.state([1.0], [0.5]), 0.0..8.0 * step)
+            .expect("a run");
+        let warnings = motion.warnings();
+        assert!(warnings.is_empty(), "{step:e}: {}", warnings[0]);
+    }
 }
