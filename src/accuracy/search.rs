@@ -15,7 +15,7 @@ use ladder::{Ladder, Verdict};
 use probe::probe;
 use runs::{
     AIM, COARSER, Climbed, FIRST, LEAST_FACTOR, LEFT, LONGER, MOST_FACTOR, MOST_RUNS, MOST_STEPS,
-    TIGHTEST, largest,
+    Noting, TIGHTEST, largest,
 };
 pub(crate) use runs::{
     Asked, Beside, Failed, Found, Graded, Judge, Pilot, Ran, RanBeside, Runner, Way, next,
@@ -39,6 +39,16 @@ const STIFF: f64 = 3.0;
 /// # Errors
 /// A failure that does not depend on the step size.
 pub(crate) fn search(
+    asked: &Asked,
+    run: &mut dyn Runner,
+    pilot: Option<&mut Pilot<'_>>,
+) -> Result<Found, RunErrorKind> {
+    let mut noting = Noting::new(run);
+    let found = searched(asked, &mut noting, pilot);
+    found.map_err(|error| noting.explained(error))
+}
+
+fn searched(
     asked: &Asked,
     run: &mut dyn Runner,
     pilot: Option<&mut Pilot<'_>>,

@@ -125,6 +125,25 @@ fn sliding_is_told() {
     assert!(error.to_string().contains("slides"), "{error}");
 }
 
+/// A body that friction holds at rest from the start: −x − x³ = −2 is less than the friction 3. Only steps in which
+/// nothing changes are solved, and that too many of these would be needed explains nothing.
+#[test]
+fn sticking_is_told() {
+    let held = Coulomb {
+        c: 3.0,
+        a: 0.5,
+        w: 1.3,
+    };
+    let error = Simulation::new(&held)
+        .accuracy(1e-6)
+        .run(held.state([1.0], [0.0]), 0.0..10.0)
+        .expect_err("sticks");
+    assert!(
+        !matches!(error.kind(), RunErrorKind::TooManySteps { .. }),
+        "{error}"
+    );
+}
+
 /// A force that is switched off at a given time.
 #[test]
 fn jumps_in_time_are_found() {

@@ -240,3 +240,122 @@ fn slides(kind: &RunErrorKind) -> bool {
 pub(super) fn largest(errors: &[Vec<f64>]) -> f64 {
     errors.iter().flatten().copied().fold(0.0, larger)
 }
+
+/// A runner that remembers why runs fail.
+pub(super) struct Noting<'r> {
+    runner: &'r mut dyn Runner,
+    /// The first failure, or the first because the motion slides.
+    failure: Option<RunErrorKind>,
+}
+
+impl<'r> Noting<'r> {
+    pub(super) fn new(runner: &'r mut dyn Runner) -> Self {
+        Self {
+            runner,
+            failure: None,
+        }
+    }
+
+    fn note(&mut self, failed: &Failed) {
+        let slid = |known: &RunErrorKind| slides(known) || !slides(&failed.kind);
+        if !failed.is_unresolved() && !self.failure.as_ref().is_some_and(slid) {
+            self.failure = Some(failed.kind.clone());
+        }
+    }
+
+    /// The error of a search. Where steps below a rounding of the span would be needed, these are no steps of the motion:
+    /// the state does not change in them, as where friction holds a body at rest. Why longer steps fail tells more.
+    pub(super) fn explained(self, error: RunErrorKind) -> RunErrorKind {
+        match (error, self.failure) {
+            (RunErrorKind::TooManySteps { span, step }, Some(failure))
+                if step.abs() < f64::EPSILON * span.abs() =>
+            {
+                failure
+            }
+            (error, _) => error,
+        }
+    }
+}
+
+impl Runner for Noting<'_> {
+    fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
+        let ran = self.runner.run(way);
+        ran.inspect_err(|failed| self.note(failed))
+    }
+
+    fn run_beside(
+        &mut self,
+        way: &Way<'_>,
+        better: &Way<'_>,
+        judge: &mut Judge<'_>,
+    ) -> Result<RanBeside, Failed> {
+        let ran = self.runner.run_beside(way, better, judge);
+        ran.inspect_err(|failed| self.note(failed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Failed, Judge, Noting, Ran, RanBeside, RunErrorKind, Runner, StepError, Way};
+    use tfe_runtime::Element;
+
+    /// Every run fails, those of steps below 1 because the motion slides.
+    struct Failing;
+
+    impl Runner for Failing {
+        fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
+            Err(Failed::from(RunErrorKind::Solve {
+                element: 0,
+                time: 0.0,
+                step: way.step,
+                source: match way.step < 1.0 {
+                    true => StepError::Slides,
+                    false => StepError::TooManyKinks,
+                },
+            }))
+        }
+
+        fn run_beside(
+            &mut self,
+            way: &Way<'_>,
+            _: &Way<'_>,
+            _: &mut Judge<'_>,
+        ) -> Result<RanBeside, Failed> {
+            Err(self.run(way).expect_err("all runs fail"))
+        }
+    }
+
+    /// The error of a search that made runs with these steps and asks for one of `step` in a span of ten.
+    fn explained(steps: &[f64], step: f64) -> RunErrorKind {
+        let mut failing = Failing;
+        let mut noting = Noting::new(&mut failing);
+        for step in steps {
+            let way = Way {
+                element: Element::mixed(5),
+                tolerance: 1e-9,
+                by_iteration: false,
+                step: *step,
+                cuts: &[],
+                grading: None,
+                keeps: false,
+            };
+            assert!(noting.run(&way).is_err());
+        }
+        noting.explained(RunErrorKind::TooManySteps { span: 10.0, step })
+    }
+
+    #[test]
+    fn steps_below_a_rounding_of_the_span_are_explained_by_longer_ones() {
+        let source = |kind| match kind {
+            RunErrorKind::Solve { source, .. } => Some(source),
+            _ => None,
+        };
+        let slides = Some(StepError::Slides);
+        assert_eq!(source(explained(&[2.0, 0.5, 3.0], 4.8e-18)), slides);
+        let kinks = Some(StepError::TooManyKinks);
+        assert_eq!(source(explained(&[2.0, 3.0], 4.8e-18)), kinks);
+        // Steps that the motion may need, or without a reason.
+        assert_eq!(source(explained(&[2.0, 0.5], 1e-9)), None);
+        assert_eq!(source(explained(&[], 4.8e-18)), None);
+    }
+}
