@@ -426,7 +426,8 @@ impl fmt::Display for RunErrorKind {
             Self::Parameter { name, value } => {
                 write!(
                     f,
-                    "parameter `{name}` was set to {value}, which is not finite"
+                    "parameter `{name}` was set to {value}, which is not finite",
+                    value = Short(*value)
                 )
             }
             Self::ParametersFixed => write!(

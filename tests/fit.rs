@@ -421,8 +421,18 @@ fn what_cannot_be_fitted_is_told() {
         }
     );
     assert!(few.to_string().contains("fit fewer parameters"), "{few}");
+    for never in [f64::NAN, f64::INFINITY] {
+        let never = fit().start(start, never).parameters(["g"]);
+        let told = error(never.output("height", [1.0], [0.5])).to_string();
+        assert!(told.contains("but it must be finite"), "{told}");
+    }
     let outside = with(fit().parameters(["c"]).bounds("c", 1.0..2.0));
     assert!(matches!(outside, Err(FitError::Bounds { value: 0.3, .. })));
+    let far = with(fit().parameters(["c"]).bounds("c", 1e-320..=5e-310)).expect_err("no fit");
+    assert!(
+        far.to_string().contains("between 1e-320 and 5e-310"),
+        "{far}"
+    );
     let stray = with(fit().parameters(["c"]).bounds("g", 1.0..2.0));
     assert!(
         stray

@@ -542,7 +542,8 @@ impl fmt::Display for BoundaryError {
             }
             Self::Value { component, value } => write!(
                 f,
-                "{component:?} is given as {value}, but it must be finite"
+                "{component:?} is given as {value}, but it must be finite",
+                value = Short(*value)
             ),
             Self::Mesh(error) => error.fmt(f),
             Self::Assembly(error) => error.fmt(f),

@@ -1,6 +1,7 @@
 //! The errors of continuation.
 
 use super::branch::Branch;
+use crate::numbers::Short;
 use crate::periodic::OrbitError;
 use std::error::Error;
 use std::fmt;
@@ -80,7 +81,10 @@ impl fmt::Display for ContinuationErrorKind {
             }
             Self::Range { start, end, value } => write!(
                 f,
-                "the range {start}..{end} must be finite and contain the value {value} of the model, before its end"
+                "the range {start}..{end} must be finite and contain the value {value} of the model, before its end",
+                start = Short(*start),
+                end = Short(*end),
+                value = Short(*value)
             ),
             Self::Steps {
                 step,
@@ -88,7 +92,10 @@ impl fmt::Display for ContinuationErrorKind {
                 largest,
             } => write!(
                 f,
-                "the steps (first {step}, smallest {smallest}, largest {largest}) must be positive and finite, the first between the smallest and the largest"
+                "the steps (first {step}, smallest {smallest}, largest {largest}) must be positive and finite, the first between the smallest and the largest",
+                step = Short(*step),
+                smallest = Short(*smallest),
+                largest = Short(*largest)
             ),
             Self::Start(error) => write!(f, "no orbit at the start of the branch: {error}"),
             Self::Step {
@@ -98,7 +105,8 @@ impl fmt::Display for ContinuationErrorKind {
             } => {
                 write!(
                     f,
-                    "the branch cannot be followed beyond the parameter {parameter} with a step of {step:.1e}: "
+                    "the branch cannot be followed beyond the parameter {parameter} with a step of {step:.1e}: ",
+                    parameter = Short(*parameter)
                 )?;
                 match source {
                     Some(error) => error.fmt(f),

@@ -1,5 +1,6 @@
 //! The errors of inputs.
 
+use crate::numbers::Short;
 use std::error::Error;
 use std::fmt;
 
@@ -65,22 +66,27 @@ impl fmt::Display for InputError {
             Self::Value { name, time, value } => {
                 write!(
                     f,
-                    "the function of input `{name}` gives {value} at t = {time}, but it must be finite"
+                    "the function of input `{name}` gives {value} at t = {time}, but it must be finite",
+                    value = Short(*value),
+                    time = Short(*time)
                 )
             }
             Self::Panicked { time } => write!(
                 f,
-                "a function of an input panicked in the element that begins at t = {time}"
+                "a function of an input panicked in the element that begins at t = {time}",
+                time = Short(*time)
             ),
             Self::Sampling { name, time, why } => {
                 write!(
                     f,
-                    "the sampled feedback of input `{name}` at t = {time}: {why}"
+                    "the sampled feedback of input `{name}` at t = {time}: {why}",
+                    time = Short(*time)
                 )
             }
             Self::NotFinite { name, value } => write!(
                 f,
-                "input `{name}` was set to {value}, but it must be finite"
+                "input `{name}` was set to {value}, but it must be finite",
+                value = Short(*value)
             ),
             Self::Table { name, why } => write!(f, "the table of input `{name}` is invalid: {why}"),
         }

@@ -1,6 +1,7 @@
 //! The errors of model comparisons.
 
 use crate::error::RunErrorKind;
+use crate::numbers::Short;
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::ElementError;
@@ -97,7 +98,8 @@ impl fmt::Display for FidelityError {
             ),
             Self::Accuracy { accuracy } => write!(
                 f,
-                "an accuracy is {accuracy}, but it must be finite and greater than zero"
+                "an accuracy is {accuracy}, but it must be finite and greater than zero",
+                accuracy = Short(*accuracy)
             ),
             Self::Parts { parts, most } => write!(
                 f,
@@ -105,7 +107,9 @@ impl fmt::Display for FidelityError {
             ),
             Self::Span { start, end } => write!(
                 f,
-                "the span {start}..{end} is empty, has an end that is not finite, or is too short for so many steps"
+                "the span {start}..{end} is empty, has an end that is not finite, or is too short for so many steps",
+                start = Short(*start),
+                end = Short(*end)
             ),
             Self::Reference(kind) => write!(
                 f,

@@ -1,6 +1,7 @@
 //! The errors of parameter identification.
 
 use crate::error::RunErrorKind;
+use crate::numbers::Short;
 use std::error::Error;
 use std::fmt;
 
@@ -118,12 +119,20 @@ impl fmt::Display for FitError {
                 } else {
                     write!(
                         f,
-                        "`{name}` begins with {value}, which is not between {low} and {high}: change its value in the model, or the bounds"
+                        "`{name}` begins with {value}, which is not between {low} and {high}: change its value in the model, or the bounds",
+                        value = Short(*value),
+                        low = Short(*low),
+                        high = Short(*high)
                     )
                 }
             }
             Self::Early { time, start } => {
-                write!(f, "a value was measured at t = {time}, before the start at {start}: give a start at or before the first time")
+                let (time, at) = (Short(*time), Short(*start));
+                if start.is_finite() {
+                    write!(f, "a value was measured at t = {time}, before the start at {at}: give a start at or before the first time")
+                } else {
+                    write!(f, "the start is at t = {at}, but it must be finite: give a start at or before the first time, {time}")
+                }
             }
             Self::StartOfConstraints => f.write_str(
                 "the start of a model with constraints must be known: give `.start(state, t0)`",

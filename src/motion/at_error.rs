@@ -1,5 +1,6 @@
 //! The errors of evaluating a motion at a time.
 
+use crate::numbers::Short;
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::ModelError;
@@ -56,12 +57,16 @@ impl fmt::Display for AtError {
             Self::Outside { time, start, end } => {
                 write!(
                     f,
-                    "t = {time} lies outside the motion, which spans {start} to {end}"
+                    "t = {time} lies outside the motion, which spans {start} to {end}",
+                    time = Short(*time),
+                    start = Short(*start),
+                    end = Short(*end)
                 )
             }
             Self::NotRecorded { time } => write!(
                 f,
-                "the element around t = {time} was not recorded; run without `record_every` for dense output"
+                "the element around t = {time} was not recorded; run without `record_every` for dense output",
+                time = Short(*time)
             ),
             Self::NoOutput { output, known } if known.is_empty() => {
                 write!(
@@ -82,12 +87,16 @@ impl fmt::Display for AtError {
             } => write!(
                 f,
                 "the model is not that of the run: at t = {time} its output `{output}` is {computed}, recorded was {recorded}; \
-                 it needs the parameters of the run, and after `.input(…)` or `.table(…)` the same inputs, as a `Driven` model"
+                 it needs the parameters of the run, and after `.input(…)` or `.table(…)` the same inputs, as a `Driven` model",
+                time = Short(*time),
+                computed = Short(*computed),
+                recorded = Short(*recorded)
             ),
             Self::NoVelocity { time } => {
                 write!(
                     f,
-                    "no velocity belongs to the momentum at t = {time}: is the mass matrix singular there?"
+                    "no velocity belongs to the momentum at t = {time}: is the mass matrix singular there?",
+                    time = Short(*time)
                 )
             }
             Self::Model(error) => error.fmt(f),

@@ -3,7 +3,7 @@
 use super::optimum::Optimum;
 use crate::boundary::BoundaryError;
 use crate::driven::InputError;
-use crate::numbers::WrongTolerance;
+use crate::numbers::{Short, WrongTolerance};
 use std::error::Error;
 use std::fmt;
 use tfe_runtime::{ElementError, LegendreError, ModelError};
@@ -215,7 +215,8 @@ impl fmt::Display for OptimalControlErrorKind {
                 iterations,
             } => write!(
                 f,
-                "element {element}, at t = {time}, is singular or not finite after {iterations} iterations: another guess may help"
+                "element {element}, at t = {time}, is singular or not finite after {iterations} iterations: another guess may help",
+                time = Short(*time)
             ),
             Self::Singular { iterations } => {
                 f.write_str("the problem has no single minimum near ")?;
@@ -245,7 +246,8 @@ impl fmt::Display for OptimalControlErrorKind {
             } => write!(
                 f,
                 "no minimum after {iterations} iterations, but a stationary point from which the cost falls along small changes that begin in element {element}, at t = {time}; \
-                 begin with another guess of the inputs (`.guess_input(…)`) or of the motion (`.guess(…)`), or check whether the cost decreases without bound"
+                 begin with another guess of the inputs (`.guess_input(…)`) or of the motion (`.guess(…)`), or check whether the cost decreases without bound",
+                time = Short(*time)
             ),
         }
     }

@@ -1,6 +1,7 @@
 //! Modes from the eigenvalues of a transition matrix: growth rates, frequencies, damping ratios.
 
 use super::eigenvalues::{EigenvalueError, eigenvalues};
+use crate::numbers::Short;
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
 use std::f64::consts::TAU;
@@ -30,7 +31,11 @@ impl fmt::Display for ModeError {
         match self {
             Self::Eigenvalues(error) => error.fmt(f),
             Self::Step { step } => {
-                write!(f, "the step is {step}, but it must be finite and not zero")
+                write!(
+                    f,
+                    "the step is {step}, but it must be finite and not zero",
+                    step = Short(*step)
+                )
             }
         }
     }

@@ -5,7 +5,7 @@ use super::grid::Grid;
 use super::subject::{PhasePoint, Subject};
 use crate::error::RunErrorKind;
 use crate::motion::is_same_time;
-use crate::numbers::larger;
+use crate::numbers::{Short, larger};
 use std::fmt;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Solve};
@@ -54,7 +54,8 @@ impl fmt::Display for Reference {
                 uncertainty,
             } => write!(
                 f,
-                "`{element}` with steps of at most {step}, known to {uncertainty:.1e} (the difference from twice the step)"
+                "`{element}` with steps of at most {step}, known to {uncertainty:.1e} (the difference from twice the step)",
+                step = Short(*step)
             ),
         }
     }

@@ -1,9 +1,15 @@
 //! Settings of absurd sizes: what makes no sense is refused, and what is only small gives no false warning.
 
 use crate::models::Pendulum;
+use std::error::Error;
 use std::time::Duration;
+use tfe::boundary::{BoundaryError, Component};
+use tfe::continuation::ContinuationErrorKind;
+use tfe::fidelity::FidelityError;
+use tfe::periodic::OrbitError;
 use tfe::prelude::*;
 use tfe::work_precision::WorkPrecisionError;
+use tfe::{AtError, InputError, MeshError, RunErrorKind};
 
 const PENDULUM: Pendulum = Pendulum { k: 1.0 };
 
@@ -54,5 +60,62 @@ fn the_shortest_steps_do_not_fail_to_resolve_a_motion() {
             .expect("a run");
         let warnings = motion.warnings();
         assert!(warnings.is_empty(), "{step:e}: {}", warnings[0]);
+    }
+}
+
+/// 1e308 has 309 digits, and 5e-324 as many decimals.
+#[test]
+fn numbers_of_any_size_are_short_in_messages() {
+    let name = String::from("k");
+    let errors = |value: f64| -> Vec<Box<dyn Error>> {
+        let (name, component) = (name.clone(), Component::Momentum(0));
+        vec![
+            Box::new(RunErrorKind::Parameter {
+                name: name.clone(),
+                value,
+            }),
+            Box::new(InputError::Value {
+                name,
+                time: value,
+                value,
+            }),
+            Box::new(AtError::Outside {
+                time: value,
+                start: value,
+                end: value,
+            }),
+            Box::new(BoundaryError::Value { component, value }),
+            Box::new(MeshError::Weight {
+                element: 1,
+                weight: value,
+            }),
+            Box::new(OrbitError::Number {
+                what: "energy",
+                value,
+            }),
+            Box::new(OrbitError::Stopped { time: value }),
+            Box::new(ContinuationErrorKind::Range {
+                start: value,
+                end: value,
+                value,
+            }),
+            Box::new(ContinuationErrorKind::Steps {
+                step: value,
+                smallest: value,
+                largest: value,
+            }),
+            Box::new(FidelityError::Accuracy { accuracy: value }),
+            Box::new(WorkPrecisionError::Span {
+                start: value,
+                end: value,
+            }),
+            Box::new(stability::ModeError::Step { step: value }),
+        ]
+    };
+    for (value, short) in [(1e308, "1e308"), (-1e308, "-1e308"), (5e-324, "5e-324")] {
+        for error in errors(value) {
+            let told = error.to_string();
+            assert!(told.contains(short) && told.len() < 240, "{told}");
+        }
     }
 }

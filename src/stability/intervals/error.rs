@@ -1,5 +1,6 @@
 //! The errors of the search for intervals.
 
+use crate::numbers::Short;
 use std::error::Error;
 use std::fmt;
 
@@ -56,26 +57,40 @@ impl<E: fmt::Display> fmt::Display for IntervalError<E> {
             Self::Range { start, end } => {
                 write!(
                     f,
-                    "the range {start}..{end} is empty or not finite: give two finite ends, in ascending order"
+                    "the range {start}..{end} is empty or not finite: give two finite ends, in ascending order",
+                    start = Short(*start),
+                    end = Short(*end)
                 )
             }
-            Self::Matrix { at, source } => write!(f, "no transition matrix at {at}: {source}"),
+            Self::Matrix { at, source } => {
+                write!(f, "no transition matrix at {at}: {source}", at = Short(*at))
+            }
             Self::Shape { at, rows, columns } => {
                 write!(
                     f,
-                    "the matrix at {at} is {rows} × {columns}: expected a square matrix of one size everywhere"
+                    "the matrix at {at} is {rows} × {columns}: expected a square matrix of one size everywhere",
+                    at = Short(*at)
                 )
             }
             Self::NotFinite { at } => {
-                write!(f, "the matrix at {at} has an entry that is not finite")
+                write!(
+                    f,
+                    "the matrix at {at} has an entry that is not finite",
+                    at = Short(*at)
+                )
             }
             Self::Eigenvalues { at } => {
-                write!(f, "the eigenvalues of the matrix at {at} did not converge")
+                write!(
+                    f,
+                    "the eigenvalues of the matrix at {at} did not converge",
+                    at = Short(*at)
+                )
             }
             Self::Unresolved { near, evaluations } => {
                 write!(
                     f,
-                    "the matrix is not smooth near {near}: unresolved after {evaluations} evaluations; leave that place out of the range"
+                    "the matrix is not smooth near {near}: unresolved after {evaluations} evaluations; leave that place out of the range",
+                    near = Short(*near)
                 )
             }
         }
