@@ -302,6 +302,9 @@ fn plans_that_cannot_be() {
         (f64::NAN, 4),
         (f64::INFINITY, 4),
         (1.0, 0),
+        // Lengths below all normal numbers, and cells without end.
+        (5e-324, 4),
+        (1.0, usize::MAX),
     ] {
         let map = plan.floquet(model, period, Mixed::<4>, elements);
         assert!(matches!(map, Err(MapError::Period { .. })));

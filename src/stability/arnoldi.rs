@@ -2,7 +2,7 @@
 //! iteration).
 
 use super::schur_order::Ordered;
-use crate::numbers::norm;
+use crate::numbers::{Short, is_tolerance, norm};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::error::Error;
 use std::fmt;
@@ -32,6 +32,11 @@ impl Dominant {
 pub enum DominantError {
     /// The operator has size zero.
     Empty,
+    /// The tolerance is not a number from 0 to below 1.
+    Tolerance {
+        /// The tolerance given.
+        tolerance: f64,
+    },
     /// A product with the operator is not finite.
     NotFinite,
     /// The eigenvalues of a small projected matrix did not converge.
@@ -50,6 +55,11 @@ impl fmt::Display for DominantError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Empty => f.write_str("the operator has no rows"),
+            Self::Tolerance { tolerance } => write!(
+                f,
+                "the tolerance is {}, but it must be at least 0 and less than 1",
+                Short(*tolerance)
+            ),
             Self::NotFinite => f.write_str("a product of the operator is not finite"),
             Self::Projected => f.write_str("the eigenvalues of the projection did not converge"),
             Self::NotConverged { best, tolerance } => write!(
@@ -57,7 +67,7 @@ impl fmt::Display for DominantError {
                 "no eigenvalue of largest modulus after {} products: the best has modulus {} with the residual {:.1e}, {tolerance:.1e} of it was asked for; \
                  many eigenvalues of nearly the same modulus separate slowly or never; allow more `products`, or more `vectors`",
                 best.products,
-                best.radius(),
+                Short(best.radius()),
                 best.residual
             ),
         }
@@ -100,7 +110,8 @@ impl Default for Iteration {
 /// products at best. About a stable equilibrium, all eigenvalues of a symplectic step have modulus one, and the
 /// iteration can converge only to one that is separated from the others on the unit circle.
 /// # Errors
-/// [`DominantError::Empty`] for size zero, [`NotFinite`](DominantError::NotFinite) for a product that is not finite,
+/// [`DominantError::Empty`] for size zero, [`Tolerance`](DominantError::Tolerance) for a tolerance that is none,
+/// [`NotFinite`](DominantError::NotFinite) for a product that is not finite,
 /// [`Projected`](DominantError::Projected) if the eigenvalues of the projection are not found,
 /// [`NotConverged`](DominantError::NotConverged), with the best value and its residual, if no eigenvalue converges.
 /// # Reference
@@ -139,6 +150,10 @@ fn iterate(
 ) -> Result<Dominant, DominantError> {
     if size == 0 {
         return Err(DominantError::Empty);
+    }
+    if !is_tolerance(control.tolerance) {
+        let tolerance = control.tolerance;
+        return Err(DominantError::Tolerance { tolerance });
     }
     let vectors = control.vectors.max(6).min(size);
     let mut krylov = Krylov::new(size, vectors);
@@ -322,6 +337,18 @@ mod tests {
             let found = dominant_of(80, turns(&moduli), Iteration::default()).expect("a pair");
             assert!((found.radius() / size - 1.5).abs() < 1e-10, "{found:?}");
             assert!((found.eigenvalue.arg() - 0.42).abs() < 1e-10, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_tolerance_that_is_none_is_refused() {
+        for tolerance in [f64::NAN, f64::INFINITY, -1.0, 1.0] {
+            let control = Iteration {
+                tolerance,
+                ..Iteration::default()
+            };
+            let told = dominant_of(4, turns(&[1.0, 2.0]), control).expect_err("no tolerance");
+            assert!(matches!(told, DominantError::Tolerance { .. }), "{told}");
         }
     }
 

@@ -130,8 +130,8 @@ impl MapPlan {
     /// A cell whose value is not finite counts as failed, with [`PointError::NotFinite`].
     ///
     /// # Errors
-    /// [`MapError::Resolution`] or [`MapError::Range`] for an invalid number of cells or range. Failures of single
-    /// cells are part of the map.
+    /// [`MapError::Resolution`], [`MapError::Range`] or [`MapError::Limit`] for an invalid number of cells, range or
+    /// limit. Failures of single cells are part of the map.
     pub fn run<E, F>(&self, radius: F) -> Result<StabilityMap<E>, MapError>
     where
         E: Send,
@@ -173,6 +173,9 @@ impl MapPlan {
                 let label = label.clone();
                 return Err(MapError::Range { label, start, end });
             }
+        }
+        if self.limit.is_nan() {
+            return Err(MapError::Limit);
         }
         Ok(())
     }

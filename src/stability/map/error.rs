@@ -29,9 +29,12 @@ pub enum MapError {
         /// The end asked for.
         end: f64,
     },
+    /// The value above which cells are unstable is not a number.
+    Limit,
     /// The element does not exist: an impossible number of nodes, or a quadrature that this family does not have.
     Element(ElementError),
-    /// The period is not positive and finite, or the number of elements is zero.
+    /// The period is not positive and finite, the number of elements is zero or more than ten million, or the elements
+    /// are so short that their length is below all normal numbers.
     Period {
         /// The period asked for.
         period: f64,
@@ -78,12 +81,15 @@ impl fmt::Display for MapError {
                     "`{label}` cannot go from {start} to {end}: both must be finite, the end above the start"
                 )
             }
+            Self::Limit => f.write_str(
+                "the value above which cells are unstable is not a number: leave `.limit(…)` out, or give a number near 1",
+            ),
             Self::Element(error) => error.fmt(f),
             Self::Period { period, elements } => {
                 let period = Short(*period);
                 write!(
                     f,
-                    "a period of {period} in {elements} elements: the period must be positive and finite, the elements at least one"
+                    "a period of {period} in {elements} elements: the period must be positive and finite, the elements at least one, at most ten million"
                 )
             }
             Self::Io { path, source } => write!(f, "cannot write {}: {source}", path.display()),

@@ -35,6 +35,8 @@ fn unstable_is_above_the_limit() {
     assert_eq!(map.fraction_unstable(), Some(0.5));
     let map = plan().limit(7.0).run(sum).unwrap();
     assert_eq!(map.fraction_unstable(), Some(0.25));
+    let never = plan().limit(f64::NAN).run(sum).unwrap_err();
+    assert!(matches!(never, MapError::Limit), "{never}");
     let even = plan().run(|_, _| Ok::<_, String>(1.0 + 1e-9)).unwrap();
     assert_eq!(even.fraction_unstable(), Some(0.0));
 }
@@ -130,7 +132,7 @@ mod pictures {
     fn any_map_with_a_value_has_a_picture() {
         let constant = [0.0, 1.0, -3.0, 1e300, f64::MAX, 5e-324];
         for value in constant {
-            for limit in [1.0, 0.0, -5.0, f64::NAN, f64::INFINITY] {
+            for limit in [1.0, 0.0, -5.0, f64::INFINITY] {
                 let map = plan()
                     .limit(limit)
                     .run(|_, _| Ok::<_, String>(value))
