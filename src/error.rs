@@ -109,6 +109,8 @@ pub enum RunErrorKind {
         /// Its end.
         end: f64,
     },
+    /// The time of a [break](crate::Simulation::break_at) is not a number.
+    Break,
     /// A coordinate or momentum of the start is not finite.
     Start {
         /// The index of the coordinate.
@@ -479,6 +481,9 @@ impl fmt::Display for RunErrorKind {
                 let (start, end) = (Short(*start), Short(*end));
                 write!(f, "there are no nodes in the span {start}..{end}: give at least its two ends")
             }
+            Self::Break => f.write_str(
+                "the time of a break is not a number: give `break_at` the time at which a force jumps, or leave it out",
+            ),
             Self::Start { coordinate, q, p } => {
                 let (q, p) = (Short(*q), Short(*p));
                 write!(

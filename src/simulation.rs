@@ -36,7 +36,7 @@ pub use crate::motion::Checkpoint;
 pub(crate) use crate::motion::Reached;
 pub use crate::motion::Warning;
 pub use accurate::Accurate;
-pub(crate) use checks::{check_constraints, check_start, check_tolerance};
+pub(crate) use checks::{check_breaks, check_constraints, check_start, check_tolerance};
 pub(crate) use differentiable::Differentiable;
 pub use events::act::{Act, Crossing, Event, Occurrence};
 pub use events::settings::Settings;

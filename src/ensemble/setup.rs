@@ -11,7 +11,7 @@ use crate::motion::{Node, default_step};
 use crate::progress::Progress;
 use crate::simulation::mesh::Mesh;
 use crate::simulation::times::looks_at_ends;
-use crate::simulation::{Watching, check_tolerance};
+use crate::simulation::{Watching, check_breaks, check_tolerance};
 use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::Mutex;
@@ -134,9 +134,10 @@ impl<M, const N: usize, K, L: Length<N>> Ensemble<'_, M, N, K, L> {
         }
     }
 
-    /// Refuses an element that does not exist, and a tolerance that is none.
+    /// Refuses an element that does not exist, a tolerance that is none, and breaks at no time.
     pub(super) fn check_method(&self) -> Result<(), RunErrorKind> {
         self.element.validate().map_err(RunErrorKind::Element)?;
+        check_breaks(&self.breaks)?;
         check_tolerance(self.control.tolerance)
     }
 

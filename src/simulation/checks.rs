@@ -33,6 +33,14 @@ pub(crate) fn check_tolerance(tolerance: f64) -> Result<(), RunErrorKind> {
     Err(RunErrorKind::Tolerance { tolerance })
 }
 
+/// Refuses breaks at times that are not numbers, at which no element would end. One at infinity is never reached.
+pub(crate) fn check_breaks(breaks: &[f64]) -> Result<(), RunErrorKind> {
+    if breaks.iter().any(|time| time.is_nan()) {
+        return Err(RunErrorKind::Break);
+    }
+    Ok(())
+}
+
 /// Refuses start values that are not finite.
 pub(crate) fn check_start<const N: usize>(state: &State<N>) -> Result<(), RunErrorKind> {
     check_finite(&state.q, &state.p)

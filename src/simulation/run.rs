@@ -1,6 +1,6 @@
 //! Runs over a span, and endless runs.
 
-use super::checks::check_tolerance;
+use super::checks::{check_breaks, check_tolerance};
 use super::events::Events;
 use super::follow::Follower;
 use super::kind::{Chosen, Simulated};
@@ -213,6 +213,7 @@ where
             return Err(refusal.clone());
         }
         check_tolerance(self.control.tolerance)?;
+        check_breaks(&self.breaks)?;
         self.model.check_start(start, &self.impulses)
     }
 

@@ -122,7 +122,7 @@ impl Best<'_> {
             let Some(time) = run() else {
                 break;
             };
-            *self.spent += time;
+            *self.spent = self.spent.saturating_add(time);
             *self.seconds = self.seconds.min(time.as_secs_f64());
             *self.repetitions += 1;
         }

@@ -5,6 +5,7 @@ use std::error::Error;
 use std::time::Duration;
 use tfe::boundary::{BoundaryError, Component};
 use tfe::continuation::ContinuationErrorKind;
+use tfe::ensemble::EnsembleError;
 use tfe::fidelity::FidelityError;
 use tfe::periodic::OrbitError;
 use tfe::prelude::*;
@@ -118,4 +119,22 @@ fn numbers_of_any_size_are_short_in_messages() {
             assert!(told.contains(short) && told.len() < 240, "{told}");
         }
     }
+}
+
+/// No element ends at a break at NaN, so that a jump of a force there would be stepped over without a word.
+#[test]
+fn breaks_at_no_time_are_refused() {
+    let start = PENDULUM.state([1.0], [0.0]);
+    let broken = Simulation::new(&PENDULUM).step(0.1).break_at(f64::NAN);
+    let run = broken.run(start, 0.0..1.0).expect_err("no time");
+    assert_eq!(*run.kind(), RunErrorKind::Break);
+    let step = broken.steps(start, 0.0).next().expect("an error");
+    assert_eq!(step.err(), Some(RunErrorKind::Break));
+    let accurate = broken.accuracy(1e-6).run(start, 0.0..1.0);
+    assert_eq!(*accurate.expect_err("no time").kind(), RunErrorKind::Break);
+    let ensemble = Ensemble::new(&PENDULUM).step(0.1).break_at(f64::NAN);
+    let ends = ensemble.run(&[start], 0.0..1.0).err();
+    assert_eq!(ends, Some(EnsembleError::Run(RunErrorKind::Break)));
+    let never = Simulation::new(&PENDULUM).step(0.1).break_at(f64::INFINITY);
+    assert!(never.run(start, 0.0..1.0).is_ok());
 }
