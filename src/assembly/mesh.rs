@@ -109,10 +109,11 @@ impl Mesh {
     }
 
     /// Lengths of elements that divide the solution into equal arc lengths in scaled time and phase space; the nodes
-    /// are momenta and coordinates.
+    /// are momenta and coordinates. No more than [`MOST_ELEMENTS`] are made.
     pub(crate) fn equidistributed(&self, nodes: &[[&[f64]; 2]], elements: usize) -> Vec<f64> {
         /// A component that varies less than this, relative to its largest value, is constant up to rounding.
         const CONSERVED: f64 = 1e-9;
+        let elements = elements.min(MOST_ELEMENTS);
         let components = nodes.first().map_or(0, |[p, q]| p.len() + q.len());
         let component = |[p, q]: &[&[f64]; 2], k: usize| match k.checked_sub(p.len()) {
             None => p[k],
@@ -242,6 +243,16 @@ mod tests {
         for weight in mesh.equidistributed(&nodes, 2) {
             assert!((weight - 0.5).abs() < 1e-15);
         }
+    }
+
+    #[test]
+    fn no_more_elements_are_made_than_can_be_solved() {
+        let (p, q) = ([0.0, 1.0], [1.0, 0.0]);
+        let nodes: Vec<[&[f64]; 2]> = (0..2).map(|k| [&p[k..=k], &q[k..=k]]).collect();
+        let mesh = Mesh::new(1, &[]).expect("a mesh");
+        let weights = mesh.equidistributed(&nodes, usize::MAX);
+        assert_eq!(weights.len(), MOST_ELEMENTS);
+        assert!(mesh.equidistributed(&nodes, 0).is_empty());
     }
 
     #[test]

@@ -214,7 +214,7 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
 
     /// Element lengths for [`graded`](super::PeriodicOrbit::graded) that give each of `elements` elements the same arc
     /// length of the orbit, where time, every coordinate and every momentum are divided by their range. Use it for
-    /// relaxation oscillations, which alternate between fast and slow motion.
+    /// relaxation oscillations, which alternate between fast and slow motion. No more than ten million are made.
     ///
     /// ```
     /// use tfe::prelude::*;
