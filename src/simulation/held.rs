@@ -156,8 +156,8 @@ where
     /// ```
     ///
     /// # Errors
-    /// [`RunErrorKind::Input`] if the model does not declare the input or the period is not positive. If no step ends
-    /// at the time of a sample, the step that passes it returns the error.
+    /// [`RunErrorKind::Input`] if the model does not declare the input, or the period is not positive or below a rounding
+    /// of the time. If no step ends at the time of a sample, the step that passes it returns the error.
     pub fn sample(
         &mut self,
         input: &str,
@@ -165,12 +165,16 @@ where
         law: impl FnMut(&HeldNode<N, L>) -> f64 + Send + 'm,
     ) -> Result<(), RunErrorKind> {
         let place = place(M::INPUTS, input).map_err(RunErrorKind::Input)?;
+        let refused = |why| {
+            let (name, time) = (input.to_owned(), self.node.t);
+            RunErrorKind::Input(InputError::Sampling { name, time, why })
+        };
         if !(period > 0.0 && period.is_finite()) {
-            return Err(RunErrorKind::Input(InputError::Sampling {
-                name: input.to_owned(),
-                time: self.node.t,
-                why: "the period must be positive and finite",
-            }));
+            return Err(refused("the period must be positive and finite"));
+        }
+        // No step is as short as a rounding of the time.
+        if self.node.t + period == self.node.t || !period.is_normal() {
+            return Err(refused("the period is below a rounding of the time"));
         }
         self.samplers.push(Sampler {
             place,

@@ -69,6 +69,7 @@ fn feedback_is_sampled_with_its_own_rate() {
         other => panic!("{other:?}"),
     };
     assert!(told(hold().sample("u", 0.0, |_| 0.0)));
+    assert!(told(hold().sample("u", 5e-324, |_| 0.0)));
     assert!(hold().sample("v", 0.1, |_| 0.0).is_err());
     let mut between = hold();
     between
