@@ -4,7 +4,7 @@ use super::error::OrbitError;
 use super::orbit::{Verdict, sort, trivial_of};
 use super::phase::Period;
 use super::rest::{Extent, is_at_rest};
-use super::setup::PeriodicOrbit;
+use super::setup::{PeriodicOrbit, check_advance};
 use crate::assembly::{MeshError, check_tolerance};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
@@ -263,15 +263,15 @@ where
         Ok(())
     }
 
-    /// Refuses an advance of another length than that of the coordinates.
+    /// Refuses an advance of another length than that of the coordinates, or that is not finite.
     fn check_advance(&self) -> Result<(), OrbitError> {
-        let expected = self.simulation.model().coordinates();
-        let length = self
-            .advance
-            .as_ref()
-            .map_or(expected, |advance| advance.as_ref().len());
-        if length == expected {
+        let Some(advance) = &self.advance else {
             return Ok(());
+        };
+        let expected = self.simulation.model().coordinates();
+        let length = advance.as_ref().len();
+        if length == expected {
+            return check_advance(advance.as_ref());
         }
         let kind = RunErrorKind::Family(ModelError::StateLength {
             vector: "of the advance",

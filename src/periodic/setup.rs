@@ -225,6 +225,9 @@ impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
             ("energy", self.energy.unwrap_or(0.0)),
             ("value of the phase condition", phase),
         ];
+        if let Some(advance) = &self.advance {
+            check_advance(advance.as_ref())?;
+        }
         let wrong = given.into_iter().find(|(_, value)| !value.is_finite());
         wrong.map_or(Ok(()), |(what, value)| {
             Err(OrbitError::Number { what, value })
@@ -446,6 +449,15 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         }
         Ok(energy)
     }
+}
+
+/// Refuses an advance that is not finite.
+pub(super) fn check_advance(advance: &[f64]) -> Result<(), OrbitError> {
+    let wrong = advance.iter().copied().find(|value| !value.is_finite());
+    wrong.map_or(Ok(()), |value| {
+        let what = "advance";
+        Err(OrbitError::Number { what, value })
+    })
 }
 
 /// The least and the largest coordinates of the nodes.

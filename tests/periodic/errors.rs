@@ -29,10 +29,19 @@ fn orbits_that_are_ill_posed() {
             problem().start_time(value),
             problem().energy(value),
             problem().phase(of_phase),
+            problem().advance([value]),
         ] {
             let error = wrong.unknown_period(6.0).solve();
             assert!(matches!(error, Err(OrbitError::Number { .. })));
         }
+        let hybrid = PeriodicOrbit::of_simulation(&Simulation::new(&cycle))
+            .unknown_period(6.0)
+            .advance([value])
+            .solve();
+        let what = "advance";
+        assert!(
+            matches!(hybrid.err(), Some(OrbitError::Number { what: told, .. }) if told == what)
+        );
     }
     let error = problem().unknown_period(6.0).elements(0).solve();
     assert!(matches!(
