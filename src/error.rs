@@ -67,7 +67,7 @@ pub enum RunErrorKind {
         /// The reason.
         why: &'static str,
     },
-    /// The ends of the span are not finite.
+    /// The ends of the span, or its length, are not finite.
     Span {
         /// The start asked for.
         start: f64,
@@ -375,7 +375,7 @@ impl fmt::Display for RunErrorKind {
             }
             Self::Span { start, end } => {
                 let (start, end) = (Short(*start), Short(*end));
-                write!(f, "the span {start}..{end} has an end that is not finite: give finite times; `steps` needs no end")
+                write!(f, "the span {start}..{end} has an end or a length that is not finite: give finite times; `steps` needs no end")
             }
             Self::TooManySteps { span, step } => {
                 let (span, step) = (Short(*span), Short(*step));

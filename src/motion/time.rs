@@ -39,9 +39,11 @@ pub(crate) fn looked_at(times: impl IntoIterator<Item = f64>, known: &[f64]) -> 
 /// The largest number of steps. A larger one is a mistake in units: such a run would take years.
 pub(crate) const MOST_STEPS: f64 = 1e15;
 
-/// The default step size of a run.
+/// The default step size of a run: one thousandth of the span; the whole span if that is too short to be divided.
 pub(crate) fn default_step(span: &Range<f64>) -> f64 {
-    (span.end - span.start).abs() / 1000.0
+    let length = (span.end - span.start).abs();
+    let step = length / 1000.0;
+    if step == 0.0 { length } else { step }
 }
 
 /// The number of steps in a span, whose sign the step has, and whether the last one is as long as the others. Rounding

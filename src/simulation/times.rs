@@ -25,7 +25,8 @@ struct Segment {
 /// Refuses an invalid span, and a step that cannot divide it.
 pub(super) fn check_span(span: &Range<f64>, step: f64) -> Result<(), RunErrorKind> {
     let Range { start, end } = *span;
-    if !(start.is_finite() && end.is_finite()) {
+    // Also the difference of two finite times may overflow.
+    if !(end - start).is_finite() {
         return Err(RunErrorKind::Span { start, end });
     }
     if !(step.is_finite() && step != 0.0) && start != end {

@@ -83,7 +83,7 @@ impl fmt::Display for WorkPrecisionError {
             Self::Element(error) => error.fmt(f),
             Self::Span { start, end } => write!(
                 f,
-                "the span {}..{} is empty or has an end that is not finite",
+                "the span {}..{} is empty, or has an end or a length that is not finite",
                 Short(*start),
                 Short(*end)
             ),

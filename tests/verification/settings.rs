@@ -138,3 +138,23 @@ fn breaks_at_no_time_are_refused() {
     let never = Simulation::new(&PENDULUM).step(0.1).break_at(f64::INFINITY);
     assert!(never.run(start, 0.0..1.0).is_ok());
 }
+
+/// The user has given no step: an error that names one explains nothing.
+#[test]
+fn spans_of_absurd_lengths() {
+    let start = PENDULUM.state([1.0], [0.0]);
+    let run = |run: Simulation<'_, Pendulum, 1>| run.run(start, -1e308..1e308).err();
+    for long in [
+        run(Simulation::new(&PENDULUM)),
+        run(Simulation::new(&PENDULUM).step(1e300)),
+    ] {
+        let long = long.expect("no length");
+        assert!(matches!(long.kind(), RunErrorKind::Span { .. }), "{long}");
+    }
+    let accurate = Simulation::new(&PENDULUM).accuracy(1e-3);
+    let long = accurate.run(start, -1e308..1e308).expect_err("no length");
+    assert!(matches!(long.kind(), RunErrorKind::Span { .. }), "{long}");
+    let short = Simulation::new(&PENDULUM).run(start, 0.0..5e-324);
+    let short = short.expect("one step");
+    assert_eq!((short.states().len(), short.last().t), (2, 5e-324));
+}
