@@ -120,7 +120,10 @@ pub(crate) struct Assembly<const N: usize> {
     length: Option<usize>,
     elements: usize,
     dense: usize,
+    /// The number of linearisations, of all solutions together.
     iterations: u32,
+    /// The same before the current solution.
+    before: u32,
 }
 
 impl<const N: usize> Assembly<N> {
@@ -157,6 +160,7 @@ impl<const N: usize> Assembly<N> {
             elements,
             dense,
             iterations: 0,
+            before: 0,
         })
     }
 
@@ -255,9 +259,15 @@ impl<const N: usize> Assembly<N> {
         self.iterations
     }
 
-    /// The number of corrections before the last linearisation, which is what a limit of iterations counts.
+    /// Begins another solution.
+    fn begin(&mut self) {
+        self.before = self.iterations;
+    }
+
+    /// The number of corrections of this solution before the last linearisation, which is what a limit of iterations
+    /// counts.
     pub(super) fn corrections(&self) -> u32 {
-        self.iterations.saturating_sub(1)
+        self.iterations.saturating_sub(self.before + 1)
     }
 
     /// The work of the iterations.
@@ -449,6 +459,7 @@ impl<const N: usize> Assembly<N> {
         iterate: &mut Iterate<N>,
         control: Control,
     ) -> Result<(), AssemblyError> {
+        self.begin();
         problem.set_globals(&iterate.globals);
         self.linearise(problem, iterate)?;
         let mut convergence = Convergence::new(control, self.size(problem, iterate));
@@ -499,4 +510,24 @@ fn times<P: Problem<N>, const N: usize>(problem: &P, elements: usize) -> Vec<f64
         start + length
     });
     std::iter::once(start).chain(ends).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Assembly, Element};
+    use crate::stability::LinearModel;
+
+    /// A branch solves one orbit after the other in the same workspace.
+    #[test]
+    fn corrections_are_those_of_one_solution() {
+        let assembly = Assembly::<1>::new::<LinearModel<1>>(Element::mixed(3), 2, 0, 0);
+        let mut assembly = assembly.expect("an element");
+        assert_eq!(assembly.corrections(), 0);
+        for linearisations in [7, 1, 4] {
+            assembly.begin();
+            assembly.iterations += linearisations;
+            assert_eq!(assembly.corrections(), linearisations - 1);
+        }
+        assert_eq!(assembly.iterations(), 12);
+    }
 }
