@@ -399,10 +399,15 @@ fn what_cannot_be_fitted_is_told() {
     assert!(matches!(error(too_few), FitError::Measured { .. }));
     let odd = fit().parameters(["g"]).output("height", [1.0], [f64::NAN]);
     assert!(matches!(error(odd), FitError::Measured { .. }));
-    let odd = fit()
-        .parameters(["g"])
-        .output_within("height", [1.0], [0.5], 0.0);
-    assert!(matches!(error(odd), FitError::Measured { .. }));
+    for deviation in [0.0, -1.0, 5e-324, f64::NAN, f64::INFINITY] {
+        let odd = fit().parameters(["g"]);
+        let odd = error(odd.output_within("height", [1.0], [0.5], deviation));
+        assert!(matches!(odd, FitError::Measured { .. }), "{odd}");
+        assert!(
+            odd.to_string().contains("in the unit of the output"),
+            "{odd}"
+        );
+    }
     let early = fit().parameters(["g"]).output("height", [-1.0], [0.5]);
     assert_eq!(
         error(early),

@@ -61,8 +61,11 @@ impl<'a> Column<'a> {
             Some("there is none")
         } else if !times.iter().chain(values).all(|number| number.is_finite()) {
             Some("not all times and values are finite")
-        } else if !(*deviation > 0.0 && deviation.is_finite()) {
-            Some("the standard deviation is not a positive number")
+        } else if !(*deviation > 0.0 && deviation.is_normal()) {
+            // Divided by a number below all normal ones, most residuals would be infinite.
+            Some(
+                "the standard deviation must be positive, finite and not below 2.3e-308: give it in the unit of the output",
+            )
         } else {
             None
         };
