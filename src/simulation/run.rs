@@ -36,8 +36,8 @@ where
     ///   [`TooManySteps`](RunErrorKind::TooManySteps), [`StepUnresolved`](RunErrorKind::StepUnresolved),
     ///   [`NodeOrder`](RunErrorKind::NodeOrder), [`NodeEnds`](RunErrorKind::NodeEnds) for the mesh;
     ///   [`Start`](RunErrorKind::Start), [`Inconsistent`](RunErrorKind::Inconsistent) for the start;
-    ///   [`Impulse`](RunErrorKind::Impulse), [`NoEvent`](RunErrorKind::NoEvent), [`Input`](RunErrorKind::Input) for what
-    ///   else was set;
+    ///   [`Tolerance`](RunErrorKind::Tolerance), [`Break`](RunErrorKind::Break), [`Impulse`](RunErrorKind::Impulse),
+    ///   [`NoEvent`](RunErrorKind::NoEvent), [`Input`](RunErrorKind::Input) for what else was set;
     /// - later: [`Solve`](RunErrorKind::Solve) for an element that cannot be solved, [`Input`](RunErrorKind::Input) for a
     ///   function of an input that fails in one; at events [`EventsWithoutEnd`](RunErrorKind::EventsWithoutEnd),
     ///   [`NoParameter`](RunErrorKind::NoParameter), [`Parameter`](RunErrorKind::Parameter),

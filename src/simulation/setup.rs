@@ -192,7 +192,8 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         self
     }
 
-    /// Sets the tolerance of the iteration inside an element: the error that it may leave, relative to the state.
+    /// Sets the tolerance of the iteration inside an element: the error that it may leave, relative to the state; at
+    /// least 0 and below 1.
     ///
     /// The error is estimated as the remainder of the geometric series of the increments (for a fixed-point iteration,
     /// a 64th of the tolerance is required). The default iterates until only rounding errors are left. Iteration
