@@ -266,9 +266,9 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
     /// [`UnknownOutput`](OptimalControlErrorKind::UnknownOutput),
     /// [`EndCostOfInput`](OptimalControlErrorKind::EndCostOfInput), [`Input`](OptimalControlErrorKind::Input),
     /// [`Degree`](OptimalControlErrorKind::Degree), [`Tolerance`](OptimalControlErrorKind::Tolerance) or
-    /// [`Legendre`](OptimalControlErrorKind::Legendre). If no minimum was found from the guess, it is [`Undefined`](OptimalControlErrorKind::Undefined),
-    /// [`Singular`](OptimalControlErrorKind::Singular), [`Stalled`](OptimalControlErrorKind::Stalled) or
-    /// [`NoMinimum`](OptimalControlErrorKind::NoMinimum), and the error holds the last iterate.
+    /// [`Legendre`](OptimalControlErrorKind::Legendre). If no minimum was found from the guess, it is
+    /// [`Undefined`](OptimalControlErrorKind::Undefined), [`Singular`](OptimalControlErrorKind::Singular),
+    /// [`Stalled`](OptimalControlErrorKind::Stalled) or [`NoMinimum`](OptimalControlErrorKind::NoMinimum), and the error holds the last iterate.
     pub fn solve(&self) -> Result<Optimum<N>, OptimalControlError<N>> {
         self.check()?;
         let (running, end) = (self.columns(&self.running)?, self.columns(&self.end)?);
