@@ -268,7 +268,8 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
     /// [`Degree`](OptimalControlErrorKind::Degree), [`Tolerance`](OptimalControlErrorKind::Tolerance) or
     /// [`Legendre`](OptimalControlErrorKind::Legendre). If no minimum was found from the guess, it is
     /// [`Undefined`](OptimalControlErrorKind::Undefined), [`Singular`](OptimalControlErrorKind::Singular),
-    /// [`Stalled`](OptimalControlErrorKind::Stalled) or [`NoMinimum`](OptimalControlErrorKind::NoMinimum), and the error holds the last iterate.
+    /// [`Stalled`](OptimalControlErrorKind::Stalled) or [`NoMinimum`](OptimalControlErrorKind::NoMinimum), and the error
+    /// holds the last iterate.
     pub fn solve(&self) -> Result<Optimum<N>, OptimalControlError<N>> {
         self.check()?;
         let (running, end) = (self.columns(&self.running)?, self.columns(&self.end)?);
