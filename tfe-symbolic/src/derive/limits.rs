@@ -33,7 +33,7 @@ use crate::expr::rewrite::Mapping;
 use crate::program::Array;
 use exponentials::{logarithm_where_infinite, over_exponentials, where_exponentials_vanish};
 use exponents::{where_exponents_vanish, with_quotients_merged};
-use facts::{factors_of, is_surely_positive, is_zero};
+use facts::{factors_of, is_surely_positive, is_zero, times_terms};
 use inverse::inverse_functions_over_roots;
 use norms::Norms;
 use sides::take_limits_from_both_sides;
@@ -201,11 +201,9 @@ fn times_sum(
     let mut others = factors.to_vec();
     others.retain(|(y, _)| *y != sum);
     let rest = graph.product(coefficient, &others);
-    let (constant, terms) = graph.terms(sum);
-    let mut products = vec![(constant, rest)];
-    for (c, term) in terms {
-        let product = graph.multiply(rest, term);
-        products.push((c, without_squares_of_signs(graph, product)));
+    let mut products = times_terms(graph, rest, sum);
+    for (_, product) in products.iter_mut().filter(|(_, y)| *y != rest) {
+        *product = without_squares_of_signs(graph, *product);
     }
     graph.linear(Constant::ZERO, &products)
 }

@@ -14,6 +14,19 @@ pub(super) fn factors_of(graph: &Graph, x: ExprId) -> Vec<(ExprId, i32)> {
     }
 }
 
+/// The products of an expression with the terms of a sum, each with its coefficient.
+pub(super) fn times_terms(graph: &mut Graph, x: ExprId, sum: ExprId) -> Vec<(Constant, ExprId)> {
+    let (constant, terms) = graph.terms(sum);
+    let mut products = Vec::with_capacity(terms.len() + 1);
+    if !constant.is_zero() {
+        products.push((constant, x));
+    }
+    for (c, term) in terms {
+        products.push((c, graph.multiply(x, term)));
+    }
+    products
+}
+
 /// Whether an expression is the number zero.
 pub(super) fn is_zero(graph: &Graph, x: ExprId) -> bool {
     graph.as_constant(x).is_some_and(Constant::is_zero)

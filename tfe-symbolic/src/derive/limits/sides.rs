@@ -9,7 +9,7 @@
 //! below, where sign u is 1 and −1, and sign w(u) the sign of u ∂w/∂u. Where both are the same expression, and not what the terms
 //! are at u = 0, that is the limit. Where they differ, as 2 sign x of x |x| + |x| |sin x| does, the terms are unchanged.
 
-use super::facts::{factors_of, is_at_rest, is_zero, moves};
+use super::facts::{factors_of, is_at_rest, is_zero, moves, times_terms};
 use super::norm::{MAX_DEPTH, MAX_SUMS, is_small_with_its_argument};
 use crate::derive::entry::Entry;
 use crate::expr::comparison::Comparison;
@@ -152,16 +152,10 @@ fn multiplied_out(graph: &mut Graph, term: ExprId) -> Option<Vec<Term>> {
     let (sum, _) = factors.swap_remove(at);
     let number = graph.as_multiple(term).0;
     let rest = graph.product(number, &factors);
-    let (constant, terms) = graph.terms(sum);
-    let (own, y) = graph.as_multiple(rest);
-    let mut products = Vec::with_capacity(terms.len() + 1);
-    if !constant.is_zero() {
-        products.push((constant * own, y));
-    }
-    for (c, y) in terms {
-        let product = graph.multiply(rest, y);
-        let (own, product) = graph.as_multiple(product);
-        products.push((c * own, product));
+    let mut products = times_terms(graph, rest, sum);
+    for (c, product) in &mut products {
+        let (own, y) = graph.as_multiple(*product);
+        (*c, *product) = (*c * own, y);
     }
     Some(products)
 }
