@@ -271,14 +271,15 @@ impl Monitor {
 
     /// Judges an increment, and, once increments relative to the largest coordinate have converged, what `own` computes: the
     /// same relative to the size of each coordinate, where one is small beside the largest. From then on only these count,
-    /// which `settles` remembers: a local variable, so that models without small coordinates compile nothing of this.
+    /// which `settles` remembers: a local variable, so that models without small coordinates compile nothing of this. Rough
+    /// tolerances stay relative to the largest coordinate.
     ///
     /// # Errors
     /// [`StepError::NonFinite`].
     #[inline(always)]
     pub(crate) fn judge_each(
         &mut self,
-        increment: Increment,
+        (increment, control): (Increment, &Control),
         settles: &mut bool,
         own: impl FnOnce() -> Option<f64>,
     ) -> Result<Verdict, StepError> {
@@ -287,6 +288,7 @@ impl Monitor {
             false => self.judge(increment)?,
         };
         if matches!(verdict, Verdict::Converged)
+            && !control.is_rough()
             && let Some(own) = own()
         {
             *settles = true;
@@ -422,11 +424,8 @@ where
         statistics.iterations += 1;
         statistics.fixed_point_iterations += 1;
         let increment = equations.measure(unknowns, step);
-        let own_increment = || match control.is_rough() {
-            true => None,
-            false => equations.measure_own(unknowns, step),
-        };
-        let verdict = monitor.judge_each(increment, &mut settles, own_increment)?;
+        let own_increment = || equations.measure_own(unknowns, step);
+        let verdict = monitor.judge_each((increment, control), &mut settles, own_increment)?;
         equations.statistics().contraction = Contraction::of(monitor.rate());
         if let Verdict::Converged = verdict {
             return monitor.evidence(yielding).check(control.solve);
@@ -518,11 +517,8 @@ pub(crate) fn newton(
         let increment = equations.measure(unknowns, step);
         own |= fresh;
         evidence.see(increment, own);
-        let own_increment = || match control.is_rough() {
-            true => None,
-            false => equations.measure_own(unknowns, step),
-        };
-        let verdict = monitor.judge_each(increment, &mut settles, own_increment)?;
+        let own_increment = || equations.measure_own(unknowns, step);
+        let verdict = monitor.judge_each((increment, control), &mut settles, own_increment)?;
         // Linear equations are solved once; a second solution removes the rounding error.
         let refined = linear && iteration > 0 && increment.relative <= ROUND_OFF;
         if refined || matches!(verdict, Verdict::Converged) || monitor.is_rounding(fresh) {

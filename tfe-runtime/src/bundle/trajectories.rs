@@ -8,7 +8,6 @@ use crate::points::arrangement::Arrangement;
 use crate::points::first_order::Rows;
 use crate::points::inertia::Inertia;
 use crate::points::second_order::Forces;
-use crate::points::sweep::Magnitude;
 use crate::registers::pair::{Eight, LANES};
 use crate::registers::storage::{Fixed, Heap, Matrix};
 
@@ -22,7 +21,6 @@ pub(super) struct Trajectories<'a, M, V: Eight, const N: usize> {
 
 impl<M, V: Eight, const N: usize> Arrangement<V, LANES, N> for Trajectories<'_, M, V, N> {
     type Memory = Heap;
-    type Size = Magnitude<V>;
     type Number = [f64; LANES];
     type Entry = f64;
 

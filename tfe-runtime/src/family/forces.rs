@@ -277,11 +277,8 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
             self.statistics.newton_iterations += 1;
             own |= fresh;
             evidence.see(increment, own);
-            let own_step = || match self.control.is_rough() {
-                true => None,
-                false => self.own_step(h, &tangent.rest),
-            };
-            let verdict = monitor.judge_each(increment, &mut settles, own_step);
+            let own_step = || self.own_step(h, &tangent.rest);
+            let verdict = monitor.judge_each((increment, &self.control), &mut settles, own_step);
             outcome.residual = monitor.last();
             outcome.contraction = monitor.rate();
             match verdict {

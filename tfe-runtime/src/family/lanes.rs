@@ -1,5 +1,6 @@
 //! Arithmetic of the fixed-point iteration of models of run-time length.
 
+use crate::legendre::larger;
 use crate::registers::four::Four;
 use crate::registers::storage::{Heap, Matrix};
 
@@ -45,4 +46,35 @@ pub(super) fn product<V: Four, const G: usize>(
         }
     }
     sum
+}
+
+/// The largest magnitude so far in each lane, and a sum that becomes NaN if a value is not finite.
+#[derive(Clone, Copy)]
+pub(super) struct Largest<V> {
+    size: V,
+    sum: V,
+}
+
+impl<V: Four> Largest<V> {
+    #[inline(always)]
+    pub(super) fn none(like: V) -> Self {
+        let zero = like.like(0.0);
+        Self {
+            size: zero,
+            sum: zero,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn raise(&mut self, value: V) {
+        self.size = value.abs().larger(self.size);
+        self.sum += value;
+    }
+
+    /// The maximum of all lanes; NaN if one value was not finite.
+    #[inline(always)]
+    pub(super) fn get(self) -> f64 {
+        let [a, b, c, d] = (self.size + self.sum * self.sum.like(0.0)).lanes();
+        larger(larger(a, b), larger(c, d)) + 0.0 * ((a + b) + (c + d))
+    }
 }

@@ -337,11 +337,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             let increment = self.measure(h);
             own |= fresh;
             evidence.see(increment, own);
-            let own_increment = || match control.is_rough() {
-                true => None,
-                false => self.measure_own(h),
-            };
-            match monitor.judge_each(increment, &mut settles, own_increment) {
+            match monitor.judge_each((increment, &control), &mut settles, || self.measure_own(h)) {
                 Ok(Verdict::Converged) => return evidence.check(self.control.solve),
                 Ok(Verdict::GoOn) if !settles && monitor.is_noise(fresh) => {
                     return evidence.check(self.control.solve);

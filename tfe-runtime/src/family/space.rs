@@ -11,13 +11,11 @@
 //! follows a kernel that runs through its sites in strides.
 
 use super::inertia::Inertia;
-use super::lanes::{at_points, product, rows};
+use super::lanes::{Largest, at_points, product, rows};
 use super::model::{FamilyState, Gradient, Model};
 use crate::double_double::DoubleDouble;
 use crate::model::Form;
-use crate::points::arrangement::Size;
 use crate::points::end::moved;
-use crate::points::sweep::Largest;
 use crate::points::tables::Tables;
 use crate::precise::{add_exactly, exact_term};
 use crate::registers::four::{Four, block, put};

@@ -2,6 +2,7 @@
 
 use super::inertia::Inertia;
 use crate::model::{First, Model};
+use crate::precise::Precise;
 use crate::registers::side::Side;
 use crate::registers::storage::{Fixed, Matrix, Storage};
 
@@ -11,7 +12,6 @@ pub(crate) type Row<const L: usize, const N: usize> = [[f64; L]; N];
 /// The arrangement of numbers in registers: the lanes are points of one trajectory, or trajectories.
 pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
     type Memory: Storage;
-    type Size: Size<V>;
     /// A number at the start of a step: one for all points, or one for each trajectory.
     type Number: Copy;
     /// An entry of a vector over the points, for one row.
@@ -83,12 +83,26 @@ pub(crate) trait Arrangement<V: Side<L>, const L: usize, const N: usize> {
     );
 }
 
-/// The largest magnitude so far.
-pub(crate) trait Size<V>: Copy {
-    fn none(like: V) -> Self;
+/// The largest magnitude so far in each lane. NaN is ignored: if a force is not finite, the end of the step is not
+/// finite, which is checked once for each step.
+#[derive(Clone, Copy)]
+pub(crate) struct Magnitude<V>(pub(super) V);
 
-    fn raise(&mut self, value: V);
+impl<V: Precise> Magnitude<V> {
+    #[inline(always)]
+    pub(crate) fn none(like: V) -> Self {
+        Self(like.like(0.0))
+    }
 
-    /// The same for a value whose finiteness is checked elsewhere.
-    fn raise_finite(&mut self, value: V);
+    #[inline(always)]
+    pub(crate) fn raise(&mut self, value: V) {
+        self.0 = value.abs().larger(self.0);
+    }
+
+    /// One value for each lane.
+    #[cfg(feature = "alloc")]
+    #[inline(always)]
+    pub(crate) fn by_lane(self) -> V {
+        self.0
+    }
 }

@@ -1,7 +1,7 @@
 //! The iteration for equations of first order, whose unknowns are velocities or the rates of phase space: one text for
 //! four points of a trajectory side by side and for eight trajectories.
 
-use super::arrangement::{Arrangement, Row, Size};
+use super::arrangement::{Arrangement, Magnitude, Row};
 use super::evaluation::Evaluation;
 use super::forms::acting;
 use crate::model::Model;
@@ -76,7 +76,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
         at: &A,
         evaluation: &mut Evaluation<V, N>,
         refresh: bool,
-    ) -> (A::Size, A::Size)
+    ) -> (Magnitude<V>, Magnitude<V>)
     where
         V: Side<L>,
         A: Arrangement<V, L, N>,
@@ -128,7 +128,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
             at.apply(like, onto_rates, all, more_products, momenta);
         }
         at.apply(like, &tables.once, acting, forces, products);
-        let (mut changed, mut size) = (A::Size::none(like), A::Size::none(like));
+        let (mut changed, mut size) = (Magnitude::none(like), Magnitude::none(like));
         // Two separate loops: most elements need the one without projection.
         if let Some(projection) = projection {
             for c in 0..count {
@@ -147,8 +147,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                     let rate = like.with(rates[c][a]) + step;
                     at.set(&mut rates[c][a], rate);
                     changed.raise(at.weighted(a, step));
-                    // A value that is not finite shows up in the change.
-                    size.raise_finite(rate);
+                    size.raise(rate);
                 }
             }
         } else {
@@ -159,7 +158,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                     let rate = like.with(rates[c][a]) + step[a];
                     at.set(&mut rates[c][a], rate);
                     changed.raise(at.weighted(a, step[a]));
-                    size.raise_finite(rate);
+                    size.raise(rate);
                 }
             }
         }
@@ -177,7 +176,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
         at: &A,
         evaluation: &mut Evaluation<V, N>,
         (is_first, refresh): (bool, bool),
-    ) -> [(A::Size, A::Size); 2]
+    ) -> [(Magnitude<V>, Magnitude<V>); 2]
     where
         V: Side<L>,
         A: Arrangement<V, L, N>,
@@ -223,7 +222,7 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
             }
         }
         at.apply(like, &tables.once, acting, velocities, products);
-        let none = A::Size::none(like);
+        let none = Magnitude::none(like);
         let [mut of_rates, mut of_forces] = [(none, none); 2];
         for c in 0..count {
             let Evaluation { q, z: p, first } = evaluation;
@@ -248,9 +247,8 @@ impl<const L: usize, const N: usize> Rows<'_, L, N> {
                 let of_rate = rate - like.with(rates[c][a]);
                 of_forces.0.raise(at.weighted_force(a, of_force));
                 of_rates.0.raise(at.weighted(a, of_rate));
-                // A value that is not finite shows up in the changes.
-                of_forces.1.raise_finite(force);
-                of_rates.1.raise_finite(rate);
+                of_forces.1.raise(force);
+                of_rates.1.raise(rate);
                 at.set(&mut forces[c][a], force);
                 at.set(&mut rates[c][a], rate);
             }

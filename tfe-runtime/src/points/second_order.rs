@@ -1,7 +1,7 @@
 //! The iteration for equations of second order, M q̈ = f(q, q̇), whose only unknowns are the forces: one text for four
 //! points of a trajectory side by side and for eight trajectories.
 
-use super::arrangement::{Arrangement, Row, Size};
+use super::arrangement::{Arrangement, Magnitude, Row};
 use super::evaluation::Evaluation;
 use super::forms::acting;
 use crate::model::{Form, Model};
@@ -105,7 +105,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         model: &M,
         at: &A,
         evaluation: &mut Evaluation<V, N>,
-    ) -> (A::Size, A::Size)
+    ) -> (Magnitude<V>, Magnitude<V>)
     where
         V: Side<L>,
         A: Arrangement<V, L, N, Number = X>,
@@ -119,7 +119,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
             at.apply(like, once, acting, self.forces, self.more_products);
         }
         let h = like.like(at.h());
-        let (mut changed, mut size) = (A::Size::none(like), A::Size::none(like));
+        let (mut changed, mut size) = (Magnitude::none(like), Magnitude::none(like));
         let forces = self.forces;
         let count = forces.len();
         let products = &self.products[..count];
@@ -164,8 +164,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                 };
                 let factor = at.factor(like, a);
                 changed.raise(factor * (force - like.with(forces[c][a])));
-                // A value that is not finite shows up in the change.
-                size.raise_finite(factor * force);
+                size.raise(factor * force);
                 at.set(&mut forces[c][a], force);
             }
         }

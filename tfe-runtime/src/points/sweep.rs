@@ -1,6 +1,6 @@
 //! What all iterations have in common, and the arrangement of the points of one trajectory.
 
-use super::arrangement::{Arrangement, Size};
+use super::arrangement::{Arrangement, Magnitude};
 use super::evaluation::Evaluation;
 use super::first_order::Rows;
 use super::forms::acting;
@@ -10,94 +10,17 @@ use super::{LEAST, Leg, Row, Work};
 use crate::equations::Increment;
 use crate::legendre::larger;
 use crate::model::{First, Model};
-use crate::precise::Precise;
 use crate::registers::four::{Four, block, put};
 use crate::registers::storage::{Fixed, Matrix, Storage};
 
-/// The largest magnitude so far in each lane. NaN is ignored: if a force is not finite, the end of the step is not
-/// finite, which is checked once for each step.
-#[derive(Clone, Copy)]
-pub(crate) struct Magnitude<V>(V);
-
-impl<V: Precise> Size<V> for Magnitude<V> {
-    #[inline(always)]
-    fn none(like: V) -> Self {
-        Self(like.like(0.0))
-    }
-
-    #[inline(always)]
-    fn raise(&mut self, value: V) {
-        self.0 = value.abs().larger(self.0);
-    }
-
-    #[inline(always)]
-    fn raise_finite(&mut self, value: V) {
-        self.raise(value);
-    }
-}
-
-impl<V: Precise> Magnitude<V> {
-    /// One value for each lane.
-    #[cfg(feature = "alloc")]
-    #[inline(always)]
-    pub(crate) fn by_lane(self) -> V {
-        self.0
-    }
-
+impl<V: Four> Magnitude<V> {
     /// The largest magnitudes of two, over all lanes.
     #[inline(always)]
-    fn of_both(one: Self, other: Self) -> (f64, f64)
-    where
-        V: Four,
-    {
+    fn of_both(one: Self, other: Self) -> (f64, f64) {
         let ([a, b, c, d], [e, f, g, h]) = (one.0.lanes(), other.0.lanes());
         let left = one.0.with([a, e, c, g]);
         let [a, e, c, g] = left.larger(left.with([b, f, d, h])).lanes();
         (larger(a, c), larger(e, g))
-    }
-}
-
-/// The largest magnitude so far in each lane, and a sum that becomes NaN if a value is not finite.
-#[cfg(feature = "alloc")]
-#[derive(Clone, Copy)]
-pub(crate) struct Largest<V> {
-    size: V,
-    sum: V,
-}
-
-#[cfg(feature = "alloc")]
-impl<V: Precise> Size<V> for Largest<V> {
-    #[inline(always)]
-    fn none(like: V) -> Self {
-        let zero = like.like(0.0);
-        Self {
-            size: zero,
-            sum: zero,
-        }
-    }
-
-    #[inline(always)]
-    fn raise(&mut self, value: V) {
-        self.size = value.abs().larger(self.size);
-        self.sum += value;
-    }
-
-    #[inline(always)]
-    fn raise_finite(&mut self, value: V) {
-        self.size = value.abs().larger(self.size);
-    }
-}
-
-#[cfg(feature = "alloc")]
-impl<V: Precise> Largest<V> {
-    /// The maximum of all lanes; NaN if one value was not finite.
-    #[inline(always)]
-    pub(crate) fn get(self) -> f64
-    where
-        V: Four,
-    {
-        let [a, b, c, d] = (self.size + self.sum * self.sum.like(0.0)).lanes();
-        larger(larger(a, b), larger(c, d)) + 0.0 * ((a + b) + (c + d))
     }
 }
 
@@ -111,7 +34,6 @@ fn beside(h: f64, start: f64, x: f64, change: f64) -> f64 {
 /// Four points of a trajectory.
 impl<V: Four, const N: usize, S: Storage> Arrangement<V, 4, N> for Leg<'_, N, S> {
     type Memory = S;
-    type Size = Magnitude<V>;
     type Number = f64;
     type Entry = [f64; 4];
 
