@@ -70,8 +70,8 @@ impl TimeScales {
         }
     }
 
-    /// The step size 2/|λ| of the fastest rate beyond which the fixed-point iteration of elements does not converge,
-    /// so that Newton's method is needed.
+    /// The step size 2/|λ| of the fastest rate from which on Newton's method is needed: the fixed-point iteration of
+    /// an element of two nodes diverges there, and that of elements with more nodes contracts slowly at best.
     pub fn newton_from(&self) -> f64 {
         2.0 / self.fastest()
     }
@@ -113,6 +113,7 @@ impl fmt::Display for TimeScales {
         }
     }
 }
+
 #[cfg(test)]
 mod tests {
     use crate::stability::linear_model::LinearModel;
