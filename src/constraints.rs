@@ -319,7 +319,7 @@ fn step_to_constraints<M: Model<N>, const N: usize>(
 /// A_V δq = 0 ,   ∂(A v + a)/∂q δq + A δv = 0 ,   δp = L_vq δq + L_vv δv             (theory.md (T-78))
 /// ```
 ///
-/// With h independent holonomic constraints and n others there are 2N − 2h − n columns. Without constraints the result
+/// With a independent holonomic constraints and b others there are 2N − 2a − b columns. Without constraints the result
 /// is the identity.
 ///
 /// # Errors

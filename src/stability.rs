@@ -96,7 +96,7 @@ where
 /// [`Linearised::multipliers`](crate::Linearised::multipliers) does.
 ///
 /// # Shapes
-/// 2N − 2h − n rows and columns, with h independent holonomic constraints and n others.
+/// 2N − 2a − b rows and columns, with a independent holonomic constraints and b others.
 /// # Errors
 /// As from [`transition_matrix`]; also if no velocity belongs to the momenta at an end.
 ///

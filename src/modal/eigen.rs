@@ -80,7 +80,7 @@ impl Quadratic {
         })
     }
 
-    /// With M = L Lᵀ, the eigenvectors u of L⁻¹ K L⁻ᵀ give φ = L⁻ᵀ u, up to rounding errors of the largest ω².
+    /// With M = C Cᵀ, the eigenvectors u of C⁻¹ K C⁻ᵀ give φ = C⁻ᵀ u (T-112), up to rounding errors of the largest ω².
     pub(super) fn modes(&self) -> Result<Modes, ModalError> {
         let n = self.slope_q.len();
         let lower = factors(self.mass.clone())?.unpack();

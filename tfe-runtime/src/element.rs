@@ -252,9 +252,9 @@ impl Element {
     /// does not grow does not grow at any step.
     ///
     /// Mixed and energy-conserving elements integrate such models exactly with every rule that they accept, and then
-    /// are the diagonal Padé approximant (T-53); reduced primal elements are so by definition. Radau elements are
-    /// subdiagonal Padé approximants. All of these map the left half plane of λh into the unit disk. Only primal
-    /// elements with other rules do not.
+    /// are the diagonal Padé approximant (T-53), and so are reduced primal elements. Radau elements are the subdiagonal
+    /// one of degrees (s − 1, s), with s Lobatto points that of degrees (s − 2, s). All of these map the left half plane
+    /// of λh into the unit disk. Only primal elements with other rules do not.
     #[must_use]
     pub const fn is_a_stable(&self) -> bool {
         match (self.family, self.rule) {

@@ -17,8 +17,8 @@
 //!
 //! where a side with a jump has ŷ = the value at the node, one without has ŷ = the trace of y.
 //! **Primal elements** have ν on the s Gauss points with the Lagrange basis ψ_j of degree s − 1:
-//! E_lj = ψ_j(c_l), C_lj = ∫₀^{c_l} ψ_j, β_j = ∫₀¹ ψ_j; testing with δq' = ψ_i, δq(1) = 0 gives
-//! P_il = b_l E_li/β_i and G_il = b_l (1 − C_li/β_i).
+//! E_lj = ψ_j(c_l), C_lj = ∫₀^{c_l} ψ_j, β_j = ∫₀¹ ψ_j; testing with δq' = −ψ_i/β_i, δq(1) = 0 gives
+//! P_il = b_l E_li/β_i and G_il = b_l (1 − C_li/β_i) (`docs/theory.md` §6.4).
 //!
 //! Everything is computed in twice the working precision and rounded once; where sums over many
 //! steps feel the rounding (C, G, β, b), what it took is kept as a correction.
@@ -30,6 +30,7 @@ use crate::element::ElementError;
 use crate::tableau::Target;
 
 pub use crate::basis::MAX_RATES;
+
 /// Borrowed tables of an element with K points and U unknown rates; matrices are flat, row by row.
 #[derive(Clone, Copy, Debug)]
 pub struct SchemeRef<'a> {

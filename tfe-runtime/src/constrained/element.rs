@@ -1,10 +1,11 @@
-//! The equations of an element with constraints (T-72, T-73): positions by the variational rows, velocities by the symmetric ones.
+//! The equations of an element with constraints (T-72, T-73, T-80): positions by the variational rows, velocities by the
+//! symmetric ones.
 //!
 //! ```text
-//! rows     Σ_l P_il (L_v + A_Sᵀ μ)_l − h Σ_l G_il (L_q + Q + Ȧ_Sᵀ μ − A_Vᵀ μ̇)_l = p₀ + A₀,Sᵀ ν_S − A₀,Vᵀ μ₀
+//! rows     Σ_l P_il (L_v + A_Sᵀ μ)_l − h Σ_l G_il (L_q + Q + Ȧ_Sᵀ μ − A_Vᵀ μ̇)_l = p₀ + A₀,Sᵀ η_S − A₀,Vᵀ μ₀
 //! V        φ(q₁, t₁) = 0 ,   Σ_l b_l P_j′(2c_l − 1) φ(q_l, t_l) = 0 ,   j = 1 … s − 1
 //! S        A v + a = 0 at the stages
-//! end      L_v(v₁, q₁, t₁) + A₁,Vᵀ ν_V − A₁,Sᵀ ν_S = p*₁ ,   A₁ v₁ + a₁ = 0
+//! end      L_v(v₁, q₁, t₁) + A₁,Vᵀ η_V − A₁,Sᵀ η_S = p*₁ ,   A₁ v₁ + a₁ = 0
 //! ```
 //!
 //! with μ̇_l = Σ_j m_j P_j′(2c_l − 1). The equations without constraints are those of [`VelocityForm`]; constraints
