@@ -1,7 +1,7 @@
 //! Derivatives of a motion between its nodes (T-154).
 
 use nalgebra::{DMatrix, RowDVector};
-use tfe_runtime::basis::{MAX_NODES, legendre, legendre_integrals};
+use tfe_runtime::basis::{MAX_NODES, legendre, legendre_integrals, legendre_slopes};
 use tfe_runtime::{InsideLoss, InsideSlopes};
 
 /// The derivatives at the start of an element, with which its own derivatives are multiplied.
@@ -157,8 +157,9 @@ impl Inside {
         // At a fixed time, δτ = −δt/h.
         let time = moved.time(tau) / -length;
         let stretch = moved.length() / length;
-        let slopes = legendre_slopes(&values);
         let degree = self.degree();
+        // By τ, that is twice those by the argument 2τ − 1.
+        let slopes = legendre_slopes(tau, degree).map(|slope| 2.0 * slope);
         let along = |first: usize, a: usize, weights: &[f64]| -> f64 {
             let own = (0..degree).map(|m| weights[m] * moved.values[(first + m) * n + a]);
             own.sum()
@@ -175,15 +176,4 @@ impl Inside {
         }
         between
     }
-}
-
-/// dP_m(2τ − 1)/dτ from P_m.
-fn legendre_slopes(values: &[f64; MAX_NODES]) -> [f64; MAX_NODES] {
-    let mut slopes = [0.0; MAX_NODES];
-    for (m, slope) in slopes.iter_mut().enumerate() {
-        for k in (0..m).rev().step_by(2) {
-            *slope += 2.0 * (2.0 * k as f64 + 1.0) * values[k];
-        }
-    }
-    slopes
 }

@@ -55,6 +55,22 @@ pub fn legendre_integrals(tau: f64, values: &mut [f64]) {
     }
 }
 
+/// P_j′(2τ − 1) for j below `degree`, the derivatives by the argument; those by τ are twice as large.
+///
+/// P_j′ = P_{j−2}′ + (2j − 1) P_{j−1}
+#[must_use]
+pub fn legendre_slopes(tau: f64, degree: usize) -> [f64; MAX_RATES] {
+    let x = 2.0 * tau - 1.0;
+    let (mut values, mut slopes) = ([1.0, x], [0.0; MAX_RATES]);
+    for j in 1..degree.min(MAX_RATES) {
+        let before = if j >= 2 { slopes[j - 2] } else { 0.0 };
+        slopes[j] = before + (2 * j - 1) as f64 * values[0];
+        let next = ((2 * j + 1) as f64 * x * values[1] - j as f64 * values[0]) / (j + 1) as f64;
+        values = [values[1], next];
+    }
+    slopes
+}
+
 /// Fills `values[i]` with the shape function of node i at τ: Π_{j≠i} (τ − τ_j)/(τ_i − τ_j).
 ///
 /// The nodes must differ from one another; they need not lie in the interval.
@@ -174,6 +190,37 @@ mod tests {
                 // Beyond the interval the polynomials grow like (2x)^j.
                 assert!((sum - integral).abs() < 1e-14 * (1.0 + 5.0_f64.powi(j as i32) * tau));
             }
+        }
+    }
+
+    /// P_1′ = 1, P_2′ = 3x, P_3′ = (15x² − 3)/2, P_4′ = (35x³ − 15x)/2, and the values at the ends j(j + 1)/2.
+    #[test]
+    fn slopes_are_derivatives_of_legendre_polynomials() {
+        for tau in [0.0, 0.3, 0.5, 0.9, 1.0, 1.6] {
+            let x = 2.0 * tau - 1.0;
+            let square = x * x;
+            let exact = [
+                0.0,
+                1.0,
+                3.0 * x,
+                0.5 * (15.0 * square - 3.0),
+                0.5 * x * (35.0 * square - 15.0),
+            ];
+            let slopes = legendre_slopes(tau, exact.len());
+            for (slope, exact) in slopes.iter().zip(exact) {
+                // A few roundings of terms of up to 20 within the interval, and of up to 200 beyond it.
+                assert!((slope - exact).abs() <= 200.0 * f64::EPSILON * (1.0 + exact.abs()));
+            }
+            assert!(slopes[exact.len()..].iter().all(|slope| *slope == 0.0));
+        }
+        let (start, end) = (
+            legendre_slopes(0.0, MAX_RATES),
+            legendre_slopes(1.0, MAX_RATES),
+        );
+        for j in 0..MAX_RATES {
+            let size = (j * (j + 1)) as f64 / 2.0;
+            let sign = if j.is_multiple_of(2) { -1.0 } else { 1.0 };
+            assert_eq!((start[j], end[j]), (sign * size, size));
         }
     }
 

@@ -1,9 +1,8 @@
 //! The residual of an element with constraints, part by part.
 
+use crate::basis::legendre_slopes;
 use crate::constrained::constrains::Constrains;
-use crate::constrained::element::{
-    Declared, Derivatives, ElementConstraints, End, Output, Place, slopes,
-};
+use crate::constrained::element::{Declared, Derivatives, ElementConstraints, End, Output, Place};
 use crate::equations::weighted;
 use crate::velocity_form::{PointDerivatives, PointTangent};
 
@@ -19,7 +18,7 @@ impl<const N: usize> ElementConstraints<'_, N> {
         output: &mut Output<'_>,
     ) {
         let (declared, l) = (model.declared(), place.l);
-        let slopes = slopes(self.scheme.nodes[l], self.layout.degree());
+        let slopes = legendre_slopes(self.scheme.nodes[l], self.layout.degree());
         self.rows.evaluate(model, place.t, &place.q);
         match &mut output.derivatives {
             None => self.add_reactions(model, place, (x, &slopes[..]), point, None),

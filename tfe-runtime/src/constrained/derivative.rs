@@ -9,7 +9,7 @@ use crate::error::StepError;
 use crate::model::Model;
 #[cfg(feature = "alloc")]
 use crate::{
-    constrained::element::slopes,
+    basis::legendre_slopes,
     constrained::rows::Rows,
     dual::{Dual, duals},
     legendre::conjugate,
@@ -180,7 +180,7 @@ where
             (time, &q_dual),
             &v,
         );
-        let slopes = slopes(node, layout.degree());
+        let slopes = legendre_slopes(node, layout.degree());
         for holonomic in [true, false] {
             form.constraints
                 .set_mu(M::CONSTRAINTS, l, x, &slopes, holonomic);

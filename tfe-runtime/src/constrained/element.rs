@@ -22,7 +22,7 @@ use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::{ConstraintError, StepError};
 use crate::legendre::{conjugate, lagrangian_view_from, largest};
 use crate::model::{Constraint, First, Model, Second, State};
-use crate::scheme::{MAX_RATES, SchemeRef};
+use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 use crate::unlike::{by_coordinate, own_increment, raise};
 use crate::velocity_form::{PointDerivatives, VelocityForm};
@@ -92,19 +92,6 @@ impl Output<'_> {
             derivatives.by_start.fill(0.0);
         }
     }
-}
-
-/// P_j′(2c − 1), j = 0 … s − 1.
-pub(crate) fn slopes(node: f64, degree: usize) -> [f64; MAX_RATES] {
-    let x = 2.0 * node - 1.0;
-    let (mut values, mut slopes) = ([1.0, x], [0.0; MAX_RATES]);
-    for j in 1..degree.min(MAX_RATES) {
-        let before = if j >= 2 { slopes[j - 2] } else { 0.0 };
-        slopes[j] = before + (2 * j - 1) as f64 * values[0];
-        let next = ((2 * j + 1) as f64 * x * values[1] - j as f64 * values[0]) / (j + 1) as f64;
-        values = [values[1], next];
-    }
-    slopes
 }
 
 impl<'a, const N: usize> ElementConstraints<'a, N> {

@@ -1,7 +1,6 @@
 //! A trail: the solutions of the elements of one run, as initial guesses for another run of the same motion.
 
-use crate::basis::{MAX_NODES, legendre};
-use crate::constrained::element::slopes;
+use crate::basis::{MAX_NODES, legendre, legendre_slopes};
 use crate::constrained::layout::Layout;
 use crate::legendre::largest;
 use crate::model::{Constraint, Model};
@@ -280,13 +279,13 @@ impl Found<'_> {
         show(None, self.numbers[place.inside(self.degree)]);
         let mut parts = [0.0; MAX_RATES];
         for (node, weight) in scheme.unknown_nodes.iter().zip(scheme.weights) {
-            let rates = slopes(self.place(t + h * node), self.degree);
+            let rates = legendre_slopes(self.place(t + h * node), self.degree);
             let rate: f64 = (1..self.degree)
                 .map(|k| rates[k] * self.numbers[place.inside(k)])
                 .sum();
             let x = 2.0 * node - 1.0;
             let weight = 2.0 * weight * (1.0 - x * x) * rate;
-            for (part, slope) in parts.iter_mut().zip(slopes(*node, degree)) {
+            for (part, slope) in parts.iter_mut().zip(legendre_slopes(*node, degree)) {
                 *part += weight * slope;
             }
         }

@@ -22,8 +22,8 @@ use super::rows::Rows;
 use super::settling::Declarations;
 use super::start::violated;
 use super::tangent::Parts;
+use crate::basis::legendre_slopes;
 use crate::consistency::ModelError;
-use crate::constrained::element::slopes;
 use crate::constrained::residual::REST;
 use crate::control::{POSITION_ROUND_OFF, START_TOLERANCE};
 use crate::double_double::DoubleDouble;
@@ -118,7 +118,8 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         let rows = Rows::new(&*model);
         let scheme = table.view();
         let unknowns = scheme.unknowns();
-        let point = |node: &f64| Point::new(n, rows.values.len(), m, slopes(*node, unknowns));
+        let point =
+            |node: &f64| Point::new(n, rows.values.len(), m, legendre_slopes(*node, unknowns));
         let points = scheme.nodes.iter().map(point).collect();
         let (parts, matrix) = Parts::new(&*model, &rows, unknowns).ok_or(ModelError::TooLarge)?;
         let node = Node::new(&*model, &rows).ok_or(ModelError::TooLarge)?;
