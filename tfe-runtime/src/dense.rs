@@ -353,19 +353,37 @@ fn add_momentum_rates(
             add_multiple(value, factor, momentum);
         }
     }
+    reach_ends(&mut values, (start, end));
+    add_derivative(&values, n, rates);
+}
+
+/// Makes a polynomial of degree s − 1 one of degree s that has the given values at both ends, by multiples of
+/// ½ (P_s ± P_{s−1}) (T-79). `values` are its Legendre coefficients, a row for each; the last one, of P_s, is zero
+/// before.
+pub(crate) fn reach_ends(values: &mut [f64], (start, end): (&[f64], &[f64])) {
+    let n = start.len();
+    let width = n.max(1);
+    let s = (values.len() / width).saturating_sub(1);
     for a in 0..n {
         let (mut at_start, mut at_end, mut sign) = (start[a], end[a], 1.0);
-        for value in values[..count * n].chunks_exact(width) {
+        for value in values[..s * n].chunks_exact(width) {
             at_start -= sign * value[a];
             at_end -= value[a];
             sign = -sign;
         }
         // P_s(0) = sign, P_{s−1}(0) = −sign.
-        values[count * n + a] += 0.5 * (at_end + sign * at_start);
-        values[(count - 1) * n + a] += 0.5 * (at_end - sign * at_start);
+        values[s * n + a] += 0.5 * (at_end + sign * at_start);
+        values[(s - 1) * n + a] += 0.5 * (at_end - sign * at_start);
     }
-    // dP_l/dτ = 2 Σ (2k + 1) P_k over k = l − 1, l − 3, …
-    for (l, value) in values.chunks_exact(width).enumerate() {
+}
+
+/// Adds the Legendre coefficients of the derivative by τ of a polynomial, from its own; a row of n for each:
+///
+/// ```text
+/// dP_l/dτ = Σ 2 (2k + 1) P_k over k = l − 1, l − 3, …
+/// ```
+pub(crate) fn add_derivative(values: &[f64], n: usize, rates: &mut [f64]) {
+    for (l, value) in values.chunks_exact(n.max(1)).enumerate() {
         for k in (0..l).rev().step_by(2) {
             let factor = 2.0 * (2 * k + 1) as f64;
             add_multiple(&mut rates[k * n..(k + 1) * n], factor, value);

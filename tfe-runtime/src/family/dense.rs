@@ -4,6 +4,8 @@ use super::model::FamilyState;
 use crate::basis::{MAX_NODES, legendre, legendre_integrals};
 #[cfg(feature = "std")]
 use crate::dense::bounds::{LongArguments, Rows};
+#[cfg(feature = "sparse")]
+use crate::dense::{add_derivative, reach_ends};
 use crate::dense::{length, piece_at};
 #[cfg(feature = "std")]
 use crate::dual::Dual;
@@ -107,19 +109,10 @@ impl DenseElement {
         rate: &dyn Fn(usize, usize) -> f64,
         momentum: &dyn Fn(usize, usize) -> f64,
     ) -> Self {
-        let (n, s) = (start.q.len(), scheme.rates());
+        let n = start.q.len();
         let mut values = coefficients(scheme.rate, scheme.unknowns(), (1.0, n), momentum);
-        // P_j is one at the end and (−1)^j at the start.
-        let sign = |j: usize| if j.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let mut last = vec![0.0; n];
-        for a in 0..n {
-            let at = |j: usize| values[j * n + a];
-            let to_end = end.p[a] - (0..s).map(at).sum::<f64>();
-            let to_start = start.p[a] - (0..s).map(|j| sign(j) * at(j)).sum::<f64>();
-            last[a] = 0.5 * (to_end + sign(s) * to_start);
-            values[(s - 1) * n + a] += 0.5 * (to_end - sign(s) * to_start);
-        }
-        values.extend(last);
+        values.resize(values.len() + n, 0.0);
+        reach_ends(&mut values, (&start.p[..], &end.p[..]));
         Self {
             times,
             length: length(times, h),
@@ -337,22 +330,10 @@ pub(super) fn jumps(scheme: &SchemeRef<'_>) -> Vec<f64> {
 }
 
 /// The Legendre coefficients of the derivative by τ of a polynomial, from its own; a row of n for each.
-///
-/// ```text
-/// P_j′ = Σ 2 (2k + 1) P_k over k = j − 1, j − 3, …
-/// ```
 #[cfg(feature = "sparse")]
 fn rates_of(values: &[f64], n: usize) -> Vec<f64> {
-    let n = n.max(1);
     let mut rates = vec![0.0; values.len().saturating_sub(n)];
-    for (j, row) in values.chunks_exact(n).enumerate() {
-        for k in (0..j).rev().step_by(2) {
-            let factor = 2.0 * (2 * k + 1) as f64;
-            for (rate, value) in rates[k * n..(k + 1) * n].iter_mut().zip(row) {
-                *rate += factor * value;
-            }
-        }
-    }
+    add_derivative(values, n, &mut rates);
     rates
 }
 
