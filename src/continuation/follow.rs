@@ -15,6 +15,7 @@ use crate::periodic::orbit::trivial_of;
 use crate::periodic::problem::Global;
 use crate::stability::chebyshev::bracketed_root;
 use std::ops::Range;
+use tfe_runtime::basis::shape_functions;
 use tfe_runtime::{Element, Model};
 
 /// The step sizes, in arc length.
@@ -525,13 +526,9 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
 
 /// The Lagrange weights for points at `places`, evaluated at x.
 fn lagrange(places: &[f64], x: f64) -> Vec<f64> {
-    let weight = |(k, place): (usize, &f64)| {
-        let others = places.iter().enumerate().filter(|(other, _)| *other != k);
-        others
-            .map(|(_, other)| (x - other) / (place - other))
-            .product()
-    };
-    places.iter().enumerate().map(weight).collect()
+    let mut weights = vec![0.0; places.len()];
+    shape_functions(places, x, &mut weights);
+    weights
 }
 
 /// The positions of the solved orbits about a branch point, in units of [`SPACING`].
