@@ -7,10 +7,10 @@
 pub(crate) mod allowed;
 mod projection;
 
-use crate::numbers::{larger, row_of};
+use crate::numbers::{distance, larger, row_of};
 use allowed::Held;
 use nalgebra::{DMatrix, DVector};
-use projection::{Led, Projection, all_hold, distance, hold, holonomic, step_to_planes};
+use projection::{Led, Projection, all_hold, hold, holonomic, step_to_planes};
 use std::fmt;
 use tfe_runtime::constrained::{self, Gradients, Residual};
 use tfe_runtime::{Constraint, LegendreError, Model, ModelError, State, StepError, legendre};

@@ -65,14 +65,25 @@ pub(crate) fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().fold(0.0, |most, x| larger(most, x.abs()))
 }
 
-/// The Euclidean norm of numbers of any size.
+/// The Euclidean norm of numbers of any size; NaN if one is NaN.
 pub(crate) fn norm(numbers: &[f64]) -> f64 {
+    let squares: f64 = numbers.iter().map(|x| x * x).sum();
+    // A square that underflows changes no digit of such a sum.
+    if (1e-250..1e250).contains(&squares) {
+        return squares.sqrt();
+    }
     let largest = largest(numbers);
-    if largest == 0.0 {
-        return 0.0;
+    if !(largest > 0.0 && largest.is_finite()) {
+        return largest;
     }
     let sum: f64 = numbers.iter().map(|x| (x / largest).powi(2)).sum();
     largest * sum.sqrt()
+}
+
+/// The distance of two points.
+pub(crate) fn distance(a: &[f64], b: &[f64]) -> f64 {
+    let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+    norm(&differences)
 }
 
 /// A row of a table that is stored row by row; `None` beyond the last.
@@ -83,7 +94,7 @@ pub(crate) fn row_of(table: &[f64], columns: usize, row: usize) -> Option<&[f64]
 
 #[cfg(test)]
 mod tests {
-    use super::{Short, is_tolerance, larger, row_of, smaller};
+    use super::{Short, distance, is_tolerance, larger, norm, row_of, smaller};
 
     #[test]
     fn numbers_have_no_rows_of_zeros() {
@@ -104,6 +115,28 @@ mod tests {
         for wrong in [f64::NAN, f64::INFINITY, -f64::INFINITY, -1e-13, 1.0, 1e308] {
             assert!(!is_tolerance(wrong), "{wrong:e}");
         }
+    }
+
+    #[test]
+    fn norms_have_all_digits_whatever_the_size() {
+        for size in [1e-300, 1e-160, 1e-125, 1.0, 1e125, 1e160, 1e300] {
+            let length = norm(&[3.0 * size, 0.0, -4.0 * size]);
+            // Rounding errors of three products, two sums and a root.
+            assert!(
+                (length / size - 5.0).abs() <= 8.0 * f64::EPSILON * 5.0,
+                "{size:e}: {length:e}"
+            );
+            let apart = distance(&[size, 0.0], &[-2.0 * size, 4.0 * size]);
+            assert!(
+                (apart / size - 5.0).abs() <= 8.0 * f64::EPSILON * 5.0,
+                "{size:e}: {apart:e}"
+            );
+        }
+        assert_eq!((norm(&[]), norm(&[0.0, -0.0])), (0.0, 0.0));
+        assert_eq!(norm(&[f64::NEG_INFINITY, 1.0]), f64::INFINITY);
+        assert!(
+            norm(&[1e300, f64::NAN, 1.0]).is_nan() && norm(&[f64::NAN, f64::INFINITY]).is_nan()
+        );
     }
 
     #[test]

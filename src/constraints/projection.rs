@@ -1,5 +1,6 @@
 //! The projection of a position onto holonomic constraints: what no model is part of.
 
+use crate::numbers::norm;
 use nalgebra::{DMatrix, DVector};
 use tfe_runtime::constrained::{Residual, START_TOLERANCE};
 use tfe_runtime::{Constraint, StepError};
@@ -29,7 +30,7 @@ pub(super) fn step_to_planes(
     }
     let row = |c: usize| &rows[c * n..(c + 1) * n];
     let scale = |c: usize| {
-        let length = length(row(c));
+        let length = norm(row(c));
         if length > 0.0 { length } else { 1.0 }
     };
     let a = DMatrix::from_fn(holonomic.len(), n, |k, column| {
@@ -77,7 +78,7 @@ impl Projection {
         for (q, step) in q.iter_mut().zip(step.iter()) {
             *q += step;
         }
-        let (size, scale) = (step.norm(), length(q));
+        let (size, scale) = (norm(step.as_slice()), norm(q));
         if !size.is_finite() {
             return Err(StepError::NonFinite);
         }
@@ -103,15 +104,4 @@ pub(super) fn hold(residuals: &[Residual]) -> bool {
 pub(super) fn all_hold(residuals: &[Residual]) -> bool {
     let mut relative = residuals.iter().map(Residual::relative);
     relative.all(|one| one <= START_TOLERANCE)
-}
-
-/// The distance between two points.
-pub(super) fn distance(a: &[f64], b: &[f64]) -> f64 {
-    let squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
-    squares.sum::<f64>().sqrt()
-}
-
-/// The length of a vector.
-fn length(vector: &[f64]) -> f64 {
-    vector.iter().map(|a| a * a).sum::<f64>().sqrt()
 }

@@ -1,5 +1,6 @@
 //! Numbers with a separate exponent, reflections and rotations.
 
+use crate::numbers::norm;
 use nalgebra::Complex;
 use std::f64::consts::{FRAC_1_SQRT_2, LN_2};
 use std::ops::Range;
@@ -110,23 +111,6 @@ fn normalized(z: Complex<f64>) -> (Complex<f64>, i64) {
         Complex::new(times_power_of_two(z.re, -e), times_power_of_two(z.im, -e)),
         e,
     )
-}
-
-/// The Euclidean norm, without intermediate overflow or underflow.
-fn norm(x: &[f64]) -> f64 {
-    let squares: f64 = x.iter().map(|x| x * x).sum();
-    if (1e-250..1e250).contains(&squares) {
-        return squares.sqrt();
-    }
-    let size = largest(x);
-    if size == 0.0 {
-        return 0.0;
-    }
-    size * x
-        .iter()
-        .map(|x| (x / size) * (x / size))
-        .sum::<f64>()
-        .sqrt()
 }
 
 /// Overwrites x by the vector v of the reflection I − τ v vᵀ that takes x to β e₁; returns (τ, β).

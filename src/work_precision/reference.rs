@@ -5,7 +5,7 @@ use super::grid::Grid;
 use super::subject::{PhasePoint, Subject};
 use crate::error::RunErrorKind;
 use crate::motion::is_same_time;
-use crate::numbers::{Short, larger};
+use crate::numbers::{Short, distance, larger, norm};
 use std::fmt;
 use tfe_runtime::step::Control;
 use tfe_runtime::{Element, Mixed, Solve};
@@ -102,31 +102,11 @@ impl Scale {
 
     /// The relative distances of coordinates and of momenta.
     fn distances<S: PhasePoint>(self, a: &S, b: &S) -> (f64, f64) {
-        let difference = |a: &[f64], b: &[f64]| {
-            let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
-            norm(&differences)
-        };
         (
-            difference(a.q(), b.q()) / self.q,
-            difference(a.p(), b.p()) / self.p,
+            distance(a.q(), b.q()) / self.q,
+            distance(a.p(), b.p()) / self.p,
         )
     }
-}
-
-fn norm(values: &[f64]) -> f64 {
-    // Scaled first, so that squares neither overflow nor underflow.
-    let largest = values.iter().fold(0.0, |so_far: f64, value| {
-        if value.abs() <= so_far {
-            so_far
-        } else {
-            value.abs()
-        }
-    });
-    if !(largest > 0.0 && largest.is_finite()) {
-        return largest;
-    }
-    let squares = values.iter().map(|value| (value / largest).powi(2));
-    largest * squares.sum::<f64>().sqrt()
 }
 
 impl<S: PhasePoint> Known<S> {
