@@ -143,9 +143,9 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
 
     /// Sets the element: `Mixed::<4>` (the default), `Primal::<3>.reduced()`, `Element::mixed(n)`, …
     ///
-    /// Models of run-time length accept only elements that are Runge–Kutta (collocation) methods, unless the feature
-    /// `sparse` is on; if they have constraints, only Runge–Kutta elements with Gauss points. Any other element makes
-    /// the run return an error.
+    /// Models of run-time length accept only elements that are Runge–Kutta methods with their points as stages
+    /// ([`Element::is_collocated`]), unless the feature `sparse` is on; if they have constraints, only those with
+    /// n − 1 Gauss points. Any other element makes the run return an error.
     #[must_use]
     pub fn element(mut self, element: impl Into<Element>) -> Self {
         self.element = Some(element.into());
