@@ -27,7 +27,7 @@ pub use estimated::{Attempt, Estimated, Picked};
 pub(crate) use grading::Grading;
 pub(crate) use pilot::{Course, Pair, explore};
 pub(crate) use search::{
-    Asked, Beside, Failed, Found, Graded, Judge, Pilot, Ran, RanBeside, Runner, Way,
+    Asked, Beside, Failed, Found, Graded, PairObserver, Pilot, Ran, RanBeside, Runner, Way,
     damping_element_for, element_for, factor_for, next, search,
 };
 pub(crate) use trace::{Trace, difference};

@@ -18,7 +18,7 @@ use runs::{
     Noting, TIGHTEST, largest,
 };
 pub(crate) use runs::{
-    Asked, Beside, Failed, Found, Graded, Judge, Pilot, Ran, RanBeside, Runner, Way, next,
+    Asked, Beside, Failed, Found, Graded, PairObserver, Pilot, Ran, RanBeside, Runner, Way, next,
 };
 use tfe_runtime::{Element, Solve, Statistics};
 
@@ -373,7 +373,7 @@ mod tests {
             &mut self,
             way: &Way<'_>,
             better: &Way<'_>,
-            judge: &mut Judge<'_>,
+            observer: &mut PairObserver<'_>,
         ) -> Result<RanBeside, Failed> {
             let mut traces = [Trace::new(1, 0), Trace::new(1, 0)];
             let step = way.taken();
@@ -387,7 +387,7 @@ mod tests {
                 }
                 self.last = off[0];
                 times.push(start + 10.0 * done);
-                let goes_on = judge(&Beside {
+                let goes_on = observer(&Beside {
                     time: start + 10.0 * done,
                     apart: &[(off[1] - off[0]).abs(), 0.0],
                     sizes: &[1.0, 1.0],
@@ -555,7 +555,7 @@ mod tests {
             &mut self,
             way: &Way<'_>,
             _: &Way<'_>,
-            _: &mut Judge<'_>,
+            _: &mut PairObserver<'_>,
         ) -> Result<RanBeside, Failed> {
             Err(self.run(way).expect_err("all runs fail"))
         }

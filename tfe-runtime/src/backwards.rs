@@ -314,14 +314,14 @@ pub(crate) fn units(mass: f64, largest: f64) -> Units {
 
 /// Monitors the convergence of the iteration of (T-150).
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Judge {
+pub(crate) struct AdjointMonitor {
     before: f64,
     /// The last increments in the other [`Units`]; `None` once they have stopped shrinking there.
     others: [Option<f64>; 2],
     has_converged: bool,
 }
 
-impl Default for Judge {
+impl Default for AdjointMonitor {
     fn default() -> Self {
         Self {
             before: f64::INFINITY,
@@ -331,7 +331,7 @@ impl Default for Judge {
     }
 }
 
-impl Judge {
+impl AdjointMonitor {
     /// Increments of this size, relative to μ, are rounding errors.
     const ROUNDING: f64 = 1e-16;
     /// Each increment must be at most this fraction of the one before; otherwise LU factors of the tangent are cheaper.
@@ -413,7 +413,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
         let (scheme, h) = (&self.equations.scheme, self.equations.span.h);
         let points = scheme.points();
         let (of_p, of_q) = self.lambda.split_at(N);
-        let mut judge = Judge::default();
+        let mut monitor = AdjointMonitor::default();
         loop {
             for l in 0..points {
                 let mut seed = [0.0; N];
@@ -468,7 +468,7 @@ impl<M: Model<N>, const N: usize> Iteration<'_, '_, M, N> {
                     mu[j][a] = row[a];
                 }
             }
-            if let Some(verdict) = judge.see(increment, size, others) {
+            if let Some(verdict) = monitor.see(increment, size, others) {
                 return verdict;
             }
         }

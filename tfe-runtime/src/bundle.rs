@@ -12,10 +12,10 @@
 //! Lanes are used for models without constraints: for every Lagrangian; for Hamiltonians with two-field elements, and
 //! with all other elements if their equations have the form M q̈ = f. Everything else is stepped lane by lane.
 
+mod convergence;
 mod engine;
 mod first_order;
 mod group;
-mod judge;
 mod products;
 mod second_order;
 mod settled;

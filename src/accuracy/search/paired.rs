@@ -76,7 +76,7 @@ enum Verdict {
 }
 
 /// Judges two runs while they are made.
-struct Judge {
+struct PairCriterion {
     accuracy: f64,
     order: f64,
     /// The largest increase of the step.
@@ -92,7 +92,7 @@ struct Judge {
     passed: Vec<(f64, f64)>,
 }
 
-impl Judge {
+impl PairCriterion {
     /// Returns a verdict if the error is or will be too large, or unnecessarily small.
     fn look(&mut self, done: f64, beside: &Beside<'_>) -> Option<Verdict> {
         self.sizes.resize(beside.sizes.len(), 0.0);
@@ -179,7 +179,7 @@ pub(super) fn climb(
     way.step = longest.min(length / FIRST);
     let mut too_long = f64::INFINITY;
     let mut attempts: Vec<Attempt> = Vec::new();
-    let mut judge = Judge {
+    let mut criterion = PairCriterion {
         accuracy: (asked.accuracy / SAFE).min(LOOSEST),
         order: way.element.order() as f64,
         most_longer: 1.0,
@@ -200,12 +200,13 @@ pub(super) fn climb(
             return Ok(Some(Climbed::TooMany { attempts, step }));
         }
         // A run that was abandoned early does not count.
-        runs += usize::from(judge.done >= NOT_EARLIER);
-        judge.is_last = runs + 1 >= MOST_RUNS || floors == MOST_FLOORS;
+        runs += usize::from(criterion.done >= NOT_EARLIER);
+        criterion.is_last = runs + 1 >= MOST_RUNS || floors == MOST_FLOORS;
         // At most the geometric mean with the shortest step that was too long.
-        judge.most_longer = (MOST_LONGER.min(longest / way.step)).min((too_long / way.step).sqrt());
-        (judge.error, judge.done) = (0.0, 0.0);
-        judge.passed.clear();
+        criterion.most_longer =
+            (MOST_LONGER.min(longest / way.step)).min((too_long / way.step).sqrt());
+        (criterion.error, criterion.done) = (0.0, 0.0);
+        criterion.passed.clear();
         way.tolerance = (tightened * asked.tolerance(length / way.step)).max(TIGHTEST);
         let other = Way {
             element: better,
@@ -216,7 +217,7 @@ pub(super) fn climb(
         let mut verdict = None;
         let ran = run.run_beside(&way, &other, &mut |beside| {
             let done = way.between(asked.span.start, beside.time) / length;
-            verdict = judge.look(done, beside);
+            verdict = criterion.look(done, beside);
             match verdict {
                 Some(_) => ControlFlow::Break(()),
                 None => ControlFlow::Continue(()),
@@ -238,27 +239,29 @@ pub(super) fn climb(
             }
             Ok(ran) => ran,
         };
-        told.error_estimate = Some(judge.error);
+        told.error_estimate = Some(criterion.error);
         let [first, second] = &ran.traces;
         if ran.is_complete && verdict.is_none() {
             let seen = difference(first, second);
             let error = largest(&seen);
             told.error_estimate = Some(error);
             attempts.push(told);
-            let is_enough = error <= judge.accuracy;
+            let is_enough = error <= criterion.accuracy;
             errors = Some((ran.times, seen, error <= asked.accuracy / SAFE));
-            if is_enough || judge.is_last {
+            if is_enough || criterion.is_last {
                 break;
             }
-            verdict = Some(Verdict::Shorter(judge.shorter()));
+            verdict = Some(Verdict::Shorter(criterion.shorter()));
         } else {
             attempts.push(told);
         }
         match verdict {
             Some(Verdict::Longer(factor)) => way.step = (factor * taken).min(longest),
             Some(Verdict::Shorter(factor)) => {
-                let foreseen = judge.foreseen(MOST_GROWTH[0]);
-                if before.is_some_and(|before| foreseen > 0.5 * before) && judge.error < ROUNDINGS {
+                let foreseen = criterion.foreseen(MOST_GROWTH[0]);
+                if before.is_some_and(|before| foreseen > 0.5 * before)
+                    && criterion.error < ROUNDINGS
+                {
                     floors += 1;
                     tightened *= 1e-2;
                 }

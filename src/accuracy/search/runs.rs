@@ -84,17 +84,17 @@ pub(crate) type Pilot<'r> = dyn FnMut(f64) -> Option<Graded> + 'r;
 pub(crate) trait Runner {
     /// Makes one run.
     fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed>;
-    /// Makes a recorded run, and beside it another one over the same steps, until `judge` ends both.
+    /// Makes a recorded run, and beside it another one over the same steps, until `observer` ends both.
     fn run_beside(
         &mut self,
         way: &Way<'_>,
         better: &Way<'_>,
-        judge: &mut Judge<'_>,
+        observer: &mut PairObserver<'_>,
     ) -> Result<RanBeside, Failed>;
 }
 
 /// Called at every node that both runs have reached; the result says whether they continue.
-pub(crate) type Judge<'j> = dyn FnMut(&Beside<'_>) -> ControlFlow<()> + 'j;
+pub(crate) type PairObserver<'j> = dyn FnMut(&Beside<'_>) -> ControlFlow<()> + 'j;
 
 /// The comparison of two runs at a node.
 pub(crate) struct Beside<'a> {
@@ -287,16 +287,18 @@ impl Runner for Noting<'_> {
         &mut self,
         way: &Way<'_>,
         better: &Way<'_>,
-        judge: &mut Judge<'_>,
+        observer: &mut PairObserver<'_>,
     ) -> Result<RanBeside, Failed> {
-        let ran = self.runner.run_beside(way, better, judge);
+        let ran = self.runner.run_beside(way, better, observer);
         ran.inspect_err(|failed| self.note(failed))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Failed, Judge, Noting, Ran, RanBeside, RunErrorKind, Runner, StepError, Way};
+    use super::{
+        Failed, Noting, PairObserver, Ran, RanBeside, RunErrorKind, Runner, StepError, Way,
+    };
     use tfe_runtime::Element;
 
     /// Every run fails, those of steps below 1 because the motion slides.
@@ -319,7 +321,7 @@ mod tests {
             &mut self,
             way: &Way<'_>,
             _: &Way<'_>,
-            _: &mut Judge<'_>,
+            _: &mut PairObserver<'_>,
         ) -> Result<RanBeside, Failed> {
             Err(self.run(way).expect_err("all runs fail"))
         }

@@ -3,7 +3,7 @@
 use super::place::Place;
 use super::repeatable::{Repeatable, Stepping};
 use super::watcher::{Watcher, follow};
-use crate::accuracy::{Beside, Failed, Judge, Ran, RanBeside, Runner, Trace, Way};
+use crate::accuracy::{Beside, Failed, PairObserver, Ran, RanBeside, Runner, Trace, Way};
 use crate::error::RunErrorKind;
 use crate::simulation::times::Times;
 use std::mem;
@@ -162,7 +162,7 @@ impl Runner for Runs<'_> {
         &mut self,
         way: &Way<'_>,
         better: &Way<'_>,
-        judge: &mut Judge<'_>,
+        observer: &mut PairObserver<'_>,
     ) -> Result<RanBeside, Failed> {
         let run = self.run;
         let mesh = self.mesh(way)?;
@@ -200,7 +200,7 @@ impl Runner for Runs<'_> {
             one.pass(at.arrived, at.acts, true);
             // Pairs are not used for runs with events, so the parameters are those of the given model.
             other.pass(&mut **beside, 0, true);
-            goes_on = shown.judge(at.t, &watchers, judge);
+            goes_on = shown.compare(at.t, &watchers, observer);
             goes_on
         });
         self.trail = farther(trail, before, run.given().start.0);
@@ -221,7 +221,7 @@ impl Runner for Runs<'_> {
     }
 }
 
-/// What a judge is shown of two runs over the same steps.
+/// What an observer is shown of two runs over the same steps.
 #[derive(Default)]
 struct Shown {
     /// The times of the nodes.
@@ -232,16 +232,16 @@ struct Shown {
 
 impl Shown {
     /// Compares the runs at a node that both have reached; the result says whether they continue.
-    fn judge(
+    fn compare(
         &mut self,
         time: f64,
         [one, other]: &[Watcher; 2],
-        judge: &mut Judge<'_>,
+        observer: &mut PairObserver<'_>,
     ) -> ControlFlow<()> {
         self.times.push(time);
         other.trace.apart(&one.row, &other.row, &mut self.apart);
         other.trace.sizes_with(&one.row, &mut self.sizes);
-        judge(&Beside {
+        observer(&Beside {
             time,
             apart: &self.apart,
             sizes: &self.sizes,

@@ -1,7 +1,7 @@
 //! The iteration for equations of first order: the unknowns are the velocities, or the rates of phase space.
 
+use super::convergence::{Increments, larger};
 use super::group::{Group, Work, Written};
-use super::judge::{Increments, larger};
 use super::products::sum;
 use super::second_order::largest;
 use super::step::Step;

@@ -1,7 +1,7 @@
 //! The iteration for equations of second order, M q̈ = f(q, q̇): the unknowns are the forces.
 
+use super::convergence::Increments;
 use super::group::{Group, Row, Work, Written};
-use super::judge::Increments;
 use super::products::{apply, sum};
 use super::step::Step;
 use crate::model::Model;

@@ -1,7 +1,7 @@
 //! One step of eight trajectories: initial guess, iteration, end.
 
+use super::convergence::{ConvergenceMonitor, Increments, larger};
 use super::group::{Group, Row, Work, Written, flags};
-use super::judge::{Increments, Judge, larger};
 use super::products::apply;
 use super::together::Together;
 use crate::model::Model;
@@ -166,20 +166,20 @@ where
             self.control.max_iterations
         };
         let zero = like.like(0.0);
-        let mut judge = Judge::new(like, self.control.tolerance, self.control.solve);
+        let mut monitor = ConvergenceMonitor::new(like, self.control.tolerance, self.control.solve);
         let (mut active, mut arrived, mut count, mut rates) = (wanted, zero, zero, zero);
         let (mut evaluation, mut iteration) = (Evaluation::zero(like), 0);
         while iteration < most {
             let written = Written::of(active);
             let increments = self.sweep(like, group, work, written, &mut evaluation, iteration);
             count += active;
-            let (done, going) = judge.judge(increments, active);
+            let (done, going) = monitor.judge(increments, active);
             // Lanes that converged earlier keep their last rate.
-            rates = V::select(written.mask, judge.rates(), rates);
+            rates = V::select(written.mask, monitor.rates(), rates);
             arrived += done;
             active = going;
             if yielding && iteration >= 2 {
-                active = judge.hopeful(active, most - iteration);
+                active = monitor.hopeful(active, most - iteration);
             }
             iteration += 1;
             if !active.any_positive() {

@@ -2,7 +2,7 @@
 //! (T-150).
 
 use super::written::Points;
-use crate::backwards::{Judge, Units, largest_of_unlike, units};
+use crate::backwards::{AdjointMonitor, Units, largest_of_unlike, units};
 use crate::family::inertia::Inertia;
 use crate::family::model::{Block, Gradient, Model};
 use crate::family::pattern::Pattern;
@@ -235,7 +235,7 @@ impl Solve<'_> {
         let [stiffness, damping, force_q] = parts;
         let count = values.len() / groups;
         mu.fill(ZERO);
-        let mut judge = Judge::default();
+        let mut monitor = AdjointMonitor::default();
         loop {
             for g in 0..groups {
                 for a in 0..n {
@@ -298,7 +298,7 @@ impl Solve<'_> {
                 let (increment, size) = others[k];
                 beside[k] = (largest(increment), largest(size));
             }
-            if let Some(verdict) = judge.see(largest(increment), largest(size), beside) {
+            if let Some(verdict) = monitor.see(largest(increment), largest(size), beside) {
                 return verdict;
             }
         }

@@ -8,7 +8,7 @@ use crate::registers::pair::Eight;
 /// Monitors the increments of several trajectories as [`Monitor`](crate::newton::Monitor) does those of one. Truth
 /// values are the numbers one and zero.
 #[derive(Clone, Copy)]
-pub(super) struct Judge<V> {
+pub(super) struct ConvergenceMonitor<V> {
     tolerance: V,
     /// The weight of the previous rate.
     memory: V,
@@ -63,7 +63,7 @@ impl<V: Real> Increments<V> {
     }
 }
 
-impl<V: Eight> Judge<V> {
+impl<V: Eight> ConvergenceMonitor<V> {
     #[inline(always)]
     pub(super) fn new(like: V, tolerance: f64, solve: Solve) -> Self {
         let (tolerance, memory) = of_fixed_point(tolerance);
@@ -240,7 +240,7 @@ mod tests {
             let twice = |four| Pair(Lanes(four), Lanes(four));
             let like = twice([0.0; 4]);
             let tolerance = if seed % 2 == 0 { 1e-17 } else { 1e-9 };
-            let mut judge = Judge::new(like, tolerance, Solve::Auto);
+            let mut several = ConvergenceMonitor::new(like, tolerance, Solve::Auto);
             let mut monitors = [(); 4].map(|()| Monitor::of_fixed_point(tolerance));
             let mut active = [true; 4];
             for step in 0..24 {
@@ -250,9 +250,9 @@ mod tests {
                 );
                 let flags = twice(active.map(|lane| f64::from(u8::from(lane))));
                 let rest = 24 - step as u32;
-                short += u32::from(!judge.extraordinary(increments, flags).any_positive());
-                let (done, going) = judge.judge(increments, flags);
-                let hopeful = judge.hopeful(going, rest).0;
+                short += u32::from(!several.extraordinary(increments, flags).any_positive());
+                let (done, going) = several.judge(increments, flags);
+                let hopeful = several.hopeful(going, rest).0;
                 let (done, going) = (done.0, going.0);
                 for lane in 0..4 {
                     if !active[lane] {
@@ -273,7 +273,7 @@ mod tests {
                     failed += u32::from(expected == (0.0, 0.0));
                     active[lane] = expected.1 > 0.0;
                     if active[lane] {
-                        assert_eq!(judge.rates().0.0[lane], monitor.rate());
+                        assert_eq!(several.rates().0.0[lane], monitor.rate());
                         let lost = monitor.is_hopeless(rest);
                         assert_eq!(hopeful.0[lane] == 0.0, lost);
                         hopeless += u32::from(lost);
