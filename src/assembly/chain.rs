@@ -182,7 +182,6 @@ impl Chain {
     ///
     /// Newton's step and the tangent of a branch have the same matrix: the tangent's right side is zero but for the last
     /// dense row, which is one.
-    #[allow(dead_code)] // until branches of solutions are followed
     pub(crate) fn right_side_mut(&mut self, side: usize) -> &mut RightSide {
         &mut self.equations.rights[side]
     }
@@ -266,7 +265,6 @@ impl Chain {
     ///
     /// The rows are those of the links, the closure and the dense rows, the columns y_0, …, y_E, γ, in these orders. Along
     /// a branch of solutions it changes where another branch crosses.
-    #[allow(dead_code)] // until branches of solutions are followed
     pub(crate) fn sign(&self) -> f64 {
         self.sign
     }
