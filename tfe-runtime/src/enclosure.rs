@@ -60,12 +60,6 @@ impl Enclosure {
         }
     }
 
-    /// All numbers that are no further from zero than `radius`.
-    #[must_use]
-    pub fn about_zero(radius: f64) -> Self {
-        Self::between(-radius, radius)
-    }
-
     /// The lower bound.
     #[must_use]
     pub fn low(self) -> f64 {
