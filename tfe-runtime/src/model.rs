@@ -150,8 +150,8 @@ pub enum ConstraintKind {
     },
     /// A(q, t) v + a(q, t) = 0: a constraint on velocities only.
     Velocity {
-        /// Whether it is the time derivative of some φ(q, t): whether the macro has found ∂A_i/∂q_j = ∂A_j/∂q_i and
-        /// ∂A_i/∂t = ∂a/∂q_i.
+        /// Whether it is, without a factor, the time derivative of some φ(q, t): whether the macro has found
+        /// ∂A_i/∂q_j = ∂A_j/∂q_i and ∂A_i/∂t = ∂a/∂q_i.
         integrable: bool,
     },
 }
