@@ -1,4 +1,4 @@
-//! Comparisons of numbers that do not lose a NaN, and numbers of any size in messages.
+//! Comparisons of numbers that do not lose a NaN, norms of any size, and numbers of any size in messages.
 
 use std::fmt;
 

@@ -424,11 +424,3 @@ fn integral<const N: usize>(
     }
     sum
 }
-
-/// a + b, rounded, and its rounding error.
-#[cfg(feature = "alloc")]
-pub(crate) fn sum(a: f64, b: f64) -> (f64, f64) {
-    let high = a + b;
-    let part = high - a;
-    (high, (a - (high - part)) + (b - part))
-}

@@ -8,8 +8,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use crate::error::StepError;
-use crate::method::sum;
 use crate::model::State;
+use crate::precise::Precise;
 use crate::real::Real;
 
 /// A power of two so large that, for a start of that size, the constant part of the increment does not spoil the digits
@@ -108,11 +108,11 @@ impl<const N: usize> Propagator<N> {
         let (mut end, mut end_low) = (State::ZERO, State::ZERO);
         let mut zero = 0.0;
         for a in 0..N {
-            (end.q[a], end_low.q[a]) = sum(state.q[a], change.q[a] + low.q[a]);
+            (end.q[a], end_low.q[a]) = state.q[a].exact_sum(change.q[a] + low.q[a]);
             zero += 0.0 * end.q[a];
         }
         for a in 0..N {
-            (end.p[a], end_low.p[a]) = sum(state.p[a], change.p[a] + low.p[a]);
+            (end.p[a], end_low.p[a]) = state.p[a].exact_sum(change.p[a] + low.p[a]);
             zero += 0.0 * end.p[a];
         }
         // Zero times an infinity or a NaN is not zero.

@@ -1,4 +1,4 @@
-//! Constraints at one instant: the velocity that belongs to a momentum, independent rows, residuals.
+//! Constraints at one instant: the velocity that belongs to a momentum, and whether the mass matrix determines it.
 
 use crate::constrained::constrains::Constrains;
 use crate::constrained::rows::{DEPENDENT, Rows, in_units, norm, scaled, subtract_part, unit};
