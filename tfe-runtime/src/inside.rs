@@ -11,6 +11,7 @@
 
 use crate::basis::{MAX_NODES, legendre_integrals};
 use crate::condense::{Direction, add_multiple};
+use crate::constrained::rows::dot;
 use crate::dense::DenseElement;
 use crate::error::StepError;
 use crate::model::{Model, State};
@@ -168,14 +169,6 @@ impl Seeds {
         }
         Ok(())
     }
-}
-
-fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    let mut sum = 0.0;
-    for k in 0..N {
-        sum += a[k] * b[k];
-    }
-    sum
 }
 
 /// L_qq + Q_q
