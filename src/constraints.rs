@@ -212,10 +212,10 @@ pub trait ConsistentState<const N: usize>: Model<N> + Sized {
 
     /// The consistent state nearest to (q, v) at the time t.
     ///
-    /// The coordinates move to the nearest point with φ(q, t) = 0, in the sense of least |δq|; where constraints of tiny
-    /// lengths beside angles are independent only in the units of the kinetic energy, in these. The velocities then
-    /// change to satisfy A v + a = 0 with the least kinetic energy ½ δvᵀ L_vv δv of the change, as by an impulse of
-    /// the reactions:
+    /// The coordinates move to the nearest point with φ(q, t) = 0, in the sense of least |δq|; where constraints of
+    /// tiny lengths beside angles are independent only in the units of the kinetic energy, in these. The velocities
+    /// then change to satisfy A v + a = 0 with the least kinetic energy ½ δvᵀ L_vv δv of the change, as by an impulse
+    /// of the reactions:
     ///
     /// ```text
     /// q ← q − A⁺ φ(q, t) + (I − A⁺A)(q_given − q)   (repeated) ;     L_v(v) + Aᵀν = L_v(v_given) ,   A v + a = 0      (T-96)

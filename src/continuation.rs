@@ -80,7 +80,8 @@ use tfe_runtime::{Element, Model, State};
 ///
 /// The parameter must be named in the `sensitivity(…)` of the model.
 ///
-/// Defaults: as [`PeriodicOrbit`]; a first step of a hundredth of the range, steps up to a twentieth, at most 1000 points.
+/// Defaults: as [`PeriodicOrbit`]; a first step of a hundredth of the range, steps up to a twentieth, at most 1000
+/// points.
 ///
 /// # Resolution
 /// The elements have the same parts of the period along the whole branch. Where the period grows without bounds, as

@@ -21,8 +21,9 @@ pub enum RunErrorKind {
     /// The element does not exist: an impossible number of nodes, or a quadrature that this family of elements does
     /// not have.
     Element(ElementError),
-    /// The model does not pass its [check](crate::Model::check): an index computed from its fields is outside its array, or
-    /// lengths do not fit each other. For models of run-time length also something that such models do not support.
+    /// The model does not pass its [check](crate::Model::check): an index computed from its fields is outside its
+    /// array, or lengths do not fit each other. For models of run-time length also something that such models do not
+    /// support.
     Family(family::ModelError),
     /// The step size is zero, infinite or not a number. It is not a number (NaN) if a run without an end was given no
     /// step size.

@@ -152,7 +152,8 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
         &self.energies
     }
 
-    /// The state at any time within the span (dense output), from the polynomial of the element that contains it (T-69).
+    /// The state at any time within the span (dense output), from the polynomial of the element that contains it
+    /// (T-69).
     ///
     /// The polynomial starts at one node and ends at the next, so the result is continuous, except for the momenta at
     /// nodes where impulses act: there it shows the momenta before the impulse. Between the nodes the error is of

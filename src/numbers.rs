@@ -39,8 +39,8 @@ pub(crate) fn digits(number: f64, decimals: usize) -> String {
     }
 }
 
-/// Whether a number can be the tolerance of an iteration, relative to its result: one, and with it infinity, would accept
-/// any guess, and what is not a number, or below zero, would accept nothing.
+/// Whether a number can be the tolerance of an iteration, relative to its result: one, and with it infinity, would
+/// accept any guess, and what is not a number, or below zero, would accept nothing.
 pub(crate) fn is_tolerance(number: f64) -> bool {
     (0.0..1.0).contains(&number)
 }

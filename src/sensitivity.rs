@@ -256,8 +256,8 @@ impl<const N: usize, L: Length<N>> ByParameter<'_, N, L> {
     }
 
     /// ∂q/∂a, ∂p/∂a and ∂v/∂a at any time of the motion: the derivatives of what [`Motion::at`] returns (T-154). At the
-    /// time of an event, this is the derivative at that fixed time before the event, whereas [`states`](Self::states) and
-    /// [`last`](Self::last) follow the event, whose time changes with a.
+    /// time of an event, this is the derivative at that fixed time before the event, whereas [`states`](Self::states)
+    /// and [`last`](Self::last) follow the event, whose time changes with a.
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -221,8 +221,8 @@ pub fn spectral_radius(matrix: &DMatrix<f64>) -> f64 {
 /// The distance of a transition matrix from being symplectic: the largest entry of |AᵀJA − J|, with J = [[0, −1], [1,
 /// 0]] in the order (p, q) (theory.md (T-2)).
 ///
-/// Zero up to rounding for symplectic elements and models without forces. NaN for a matrix that is not square, has an odd
-/// size or an entry that is NaN.
+/// Zero up to rounding for symplectic elements and models without forces. NaN for a matrix that is not square, has an
+/// odd size or an entry that is NaN.
 pub fn symplecticity_defect(matrix: &DMatrix<f64>) -> f64 {
     let size = matrix.nrows();
     if !matrix.is_square() || !size.is_multiple_of(2) {

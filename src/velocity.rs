@@ -10,9 +10,9 @@ pub trait Velocity<const N: usize, L: Length<N> = FixedLength>: Evaluate<N, L> {
     /// The velocity dq/dt of a state at the time t: the v with ∂L/∂v = p, or ∂H/∂p.
     ///
     /// If the mass matrix is singular, it is the velocity that the constraints determine (theory.md (T-74)). It is NaN
-    /// if they do not determine it, if the iteration for v of a kinetic energy that is not quadratic fails, if the model
-    /// does not pass its [check](tfe_runtime::Model::check), or (with the length of the state) if the lengths of state
-    /// and model differ.
+    /// if they do not determine it, if the iteration for v of a kinetic energy that is not quadratic fails, if the
+    /// model does not pass its [check](tfe_runtime::Model::check), or (with the length of the state) if the lengths of
+    /// state and model differ.
     ///
     /// ```
     /// use tfe::prelude::*;

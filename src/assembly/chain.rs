@@ -110,14 +110,15 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
-    /// A chain of `links` ≥ 1 links between nodes of `block` unknowns, with `globals` global unknowns, `dense` ≤ `block` +
-    /// `globals` dense rows and one right side.
+    /// A chain of `links` ≥ 1 links between nodes of `block` unknowns, with `globals` global unknowns, `dense` ≤
+    /// `block` + `globals` dense rows and one right side.
     #[cfg(any(test, feature = "sparse"))]
     pub(crate) fn new(block: usize, globals: usize, links: usize, dense: usize) -> Self {
         Self::with_right_sides(block, globals, links, dense, 1)
     }
 
-    /// As [`new`](Self::new), with several right sides of the same equations: see [`right_side_mut`](Self::right_side_mut).
+    /// As [`new`](Self::new), with several right sides of the same equations: see
+    /// [`right_side_mut`](Self::right_side_mut).
     pub(crate) fn with_right_sides(
         block: usize,
         globals: usize,
@@ -180,8 +181,8 @@ impl Chain {
 
     /// One right side, by its index from 0; the first is the one that the other accessors give.
     ///
-    /// Newton's step and the tangent of a branch have the same matrix: the tangent's right side is zero but for the last
-    /// dense row, which is one.
+    /// Newton's step and the tangent of a branch have the same matrix: the tangent's right side is zero but for the
+    /// last dense row, which is one.
     pub(crate) fn right_side_mut(&mut self, side: usize) -> &mut RightSide {
         &mut self.equations.rights[side]
     }
@@ -193,8 +194,8 @@ impl Chain {
 
     /// Solves for all right sides.
     ///
-    /// The coefficients are kept; the solution is what [`node`](Self::node) and [`globals`](Self::globals) return. After
-    /// an error it has no meaning.
+    /// The coefficients are kept; the solution is what [`node`](Self::node) and [`globals`](Self::globals) return.
+    /// After an error it has no meaning.
     ///
     /// # Errors
     /// [`Singular`] if the equations do not determine the unknowns up to rounding errors, or a number is not finite.
@@ -263,8 +264,8 @@ impl Chain {
 
     /// The sign of the determinant of all equations: 1 or −1 after a successful [`solve`](Self::solve), otherwise 0.
     ///
-    /// The rows are those of the links, the closure and the dense rows, the columns y_0, …, y_E, γ, in these orders. Along
-    /// a branch of solutions it changes where another branch crosses.
+    /// The rows are those of the links, the closure and the dense rows, the columns y_0, …, y_E, γ, in these orders.
+    /// Along a branch of solutions it changes where another branch crosses.
     pub(crate) fn sign(&self) -> f64 {
         self.sign
     }

@@ -38,8 +38,9 @@ pub enum AssemblyError {
         time: f64,
         /// Whether the positions violate it; otherwise the velocities do.
         position: bool,
-        /// The relative violation, the first of these that exceeds the limit: |φ| / |φ_q| relative to the largest |q| of
-        /// the solution, |A v + a| / |A| relative to the largest |v|, and |φ| and |A v + a| relative to their own terms.
+        /// The relative violation, the first of these that exceeds the limit: |φ| / |φ_q| relative to the largest |q|
+        /// of the solution, |A v + a| / |A| relative to the largest |v|, and |φ| and |A v + a| relative to their own
+        /// terms.
         residual: f64,
     },
     /// The assembled equations are singular: there is no solution, or there are many close to each other (for example

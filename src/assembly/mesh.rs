@@ -172,8 +172,8 @@ pub enum MeshError {
         /// The number asked for.
         elements: usize,
     },
-    /// A weight of a graded mesh is so small beside the sum of all that its element has no length: a rounding of the time
-    /// is longer.
+    /// A weight of a graded mesh is so small beside the sum of all that its element has no length: a rounding of the
+    /// time is longer.
     TooShort {
         /// The index of the element.
         element: usize,

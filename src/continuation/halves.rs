@@ -134,8 +134,8 @@ const MOST: f64 = 0.5;
 /// The largest distance of the orbit of elements of half the length; runs have the same limit (T-121).
 const FARTHEST: f64 = 0.03;
 
-/// A test function that is smaller than this part of its value at the other end is zero up to the error of the elements:
-/// the event may lie just beyond that end.
+/// A test function that is smaller than this part of its value at the other end is zero up to the error of the
+/// elements: the event may lie just beyond that end.
 const AT_THE_END: f64 = 1e-3;
 
 impl Finer {

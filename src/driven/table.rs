@@ -115,7 +115,8 @@ fn bends(steps: &[f64], chords: &[f64]) -> Vec<f64> {
         2 => return vec![2.0 * (chords[1] - chords[0]) / (steps[0] + steps[1]); 3],
         _ => {}
     }
-    // Continuous slopes inside: h₋ f″₋ + 2(h₋ + h) f″ + h f″₊ = 6(c − c₋); the ends are extrapolated, f″₀ = f″₁ − (h₀/h₁)(f″₂ − f″₁).
+    // Continuous slopes inside: h₋ f″₋ + 2(h₋ + h) f″ + h f″₊ = 6(c − c₋); the ends are extrapolated, f″₀ = f″₁ −
+    // (h₀/h₁)(f″₂ − f″₁).
     let (mut diagonal, mut right) = (vec![0.0; n - 1], vec![0.0; n - 1]);
     let (mut lower, mut upper) = (vec![0.0; n - 1], vec![0.0; n - 1]);
     for k in 0..n - 1 {

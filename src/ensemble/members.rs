@@ -23,8 +23,8 @@ pub trait Members<'m, M: Model<N>, const N: usize>: Models<'m, M> {
     /// The type that advances eight trajectories side by side.
     type Lanes: Trajectories<'m, M, N> + Send + Sync + 'm;
 
-    /// Whether the models permit runs side by side. Models that do not pass their check do not: each of their runs has an
-    /// error of its own.
+    /// Whether the models permit runs side by side. Models that do not pass their check do not: each of their runs has
+    /// an error of its own.
     fn share_kernels(&self) -> bool;
 
     /// Creates an empty bundle of trajectories.

@@ -15,8 +15,8 @@ pub struct Choice {
     /// The step size, in units of time, positive.
     pub step: f64,
     /// The largest relative error of the outputs, but not less than the [error of the model](Rung::model_error),
-    /// because a run that is nearer to the reference than its own model is so by chance, and not less than the uncertainty
-    /// of the reference.
+    /// because a run that is nearer to the reference than its own model is so by chance, and not less than the
+    /// uncertainty of the reference.
     pub error: f64,
     /// The largest relative error of the outputs as computed.
     pub distance: f64,

@@ -13,10 +13,10 @@ impl<const N: usize, L: Length<N>> Motion<N, L> {
     /// ∫ y(t, q, q̇) dt ,     by the s Gauss points of every element, s the degree of its polynomial                   (T-164)
     /// ```
     ///
-    /// Elements that collocate at Gauss points (`Mixed`, `ThreeField`, reduced `Primal`) satisfy the equations of motion
-    /// there. The integral is therefore as accurate as the nodes, as if it had been one more coordinate; with other
-    /// elements it is at least as accurate as their polynomials. Use it for the work of a force, or for the angle that
-    /// `model(Name, routh(phi))` eliminates, whose velocity is the output `phi_rate`:
+    /// Elements that collocate at Gauss points (`Mixed`, `ThreeField`, reduced `Primal`) satisfy the equations of
+    /// motion there. The integral is therefore as accurate as the nodes, as if it had been one more coordinate; with
+    /// other elements it is at least as accurate as their polynomials. Use it for the work of a force, or for the angle
+    /// that `model(Name, routh(phi))` eliminates, whose velocity is the output `phi_rate`:
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -1,6 +1,7 @@
 //! Blocks of equations that are affine in the model functions at quadrature points, with first and second derivatives.
 //!
-//! With the variables s = (x, w) of a block, (q, z, u)_l = P_l s at its points and g = (momentum or velocity, force) there,
+//! With the variables s = (x, w) of a block, (q, z, u)_l = P_l s at its points and g = (momentum or velocity, force)
+//! there,
 //!
 //! ```text
 //! c(s) = L s + Σ_l W_l g(P_l s) ,     f(s) = Σ_l w_l ℓ(P_l s) .

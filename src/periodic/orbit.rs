@@ -46,8 +46,8 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// The distance |1 − |μ|| up to which a modulus counts as one. Multipliers of conservative models are often multiple,
-    /// and rounding moves a double one by the square root of the rounding unit.
+    /// The distance |1 − |μ|| up to which a modulus counts as one. Multipliers of conservative models are often
+    /// multiple, and rounding moves a double one by the square root of the rounding unit.
     ///
     /// A Jordan block of k equal multipliers is moved by the k-th root: by about 10⁻⁵ for k = 3 and 10⁻⁴ for k = 4, as
     /// when a symmetry or a resonance adds ones to the trivial pair. In such a case a verdict with so small a margin

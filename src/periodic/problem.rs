@@ -53,7 +53,8 @@ pub(crate) struct Periodic<'m, M, const N: usize> {
 }
 
 impl<'m, M, const N: usize> Periodic<'m, M, N> {
-    /// The elements of an iterate over the period, with their transition matrices, as far as these are known, and what they have cost.
+    /// The elements of an iterate over the period, with their transition matrices, as far as these are known, and what
+    /// they have cost.
     pub(crate) fn solution(
         &self,
         element: Element,

@@ -38,7 +38,8 @@ pub enum PeriodicSchurError {
         /// The number of rows of the first factor.
         expected: usize,
     },
-    /// A factor holds an entry that is infinite or not a number, or, for [`PeriodicSchur`](super::PeriodicSchur), its triangular form would.
+    /// A factor holds an entry that is infinite or not a number, or, for [`PeriodicSchur`](super::PeriodicSchur), its
+    /// triangular form would.
     NonFinite {
         /// The index of the factor.
         index: usize,

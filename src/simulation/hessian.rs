@@ -14,11 +14,11 @@ impl<'m, M: Model<N> + Send + Sync + 'm, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span and returns a loss with its [gradient](Self::gradient) and its matrix of second derivatives
     /// ∂²ℓ/∂θᵢ∂θⱼ with respect to the parameters θ named.
     ///
-    /// The second derivatives are differences of eighth order of gradients that are exact for the run (T-158); their error
-    /// is about 1e-11 of the change of the gradient. [`LossHessian::errors`] estimates it. Each parameter costs eight
-    /// gradients; sixteen or twenty-four if the loss is so curved that the differences have to be taken over shorter
-    /// distances; and as many again if the loss does not depend on the magnitude of the parameter, because that is
-    /// close to zero. (A least-squares [`Fit`](crate::Fit) needs first derivatives only.)
+    /// The second derivatives are differences of eighth order of gradients that are exact for the run (T-158); their
+    /// error is about 1e-11 of the change of the gradient. [`LossHessian::errors`] estimates it. Each parameter costs
+    /// eight gradients; sixteen or twenty-four if the loss is so curved that the differences have to be taken over
+    /// shorter distances; and as many again if the loss does not depend on the magnitude of the parameter, because that
+    /// is close to zero. (A least-squares [`Fit`](crate::Fit) needs first derivatives only.)
     ///
     /// ```
     /// use tfe::prelude::*;

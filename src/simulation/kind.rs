@@ -240,7 +240,8 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// The same over the part between two fractions of its length, with derivatives by this fraction.
     fn outputs_over(&self, piece: &L::Polynomial, part: (f64, f64), values: &mut [Dual<Enclosure>]);
 
-    /// The outputs and their derivatives in a direction (δt, δq, δz), z the velocities, or the momenta of a Hamiltonian.
+    /// The outputs and their derivatives in a direction (δt, δq, δz), z the velocities, or the momenta of a
+    /// Hamiltonian.
     fn outputs_towards(
         &self,
         t: Dual<f64>,

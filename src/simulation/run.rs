@@ -245,8 +245,8 @@ where
     /// An iterator over the nodes that follow `start`, one for each [step](Self::step), without end and in constant
     /// memory. A step size must be set; elements also end at [breaks](Self::break_at), as in [`run`](Self::run).
     ///
-    /// The errors are those of [`run`](Self::run), as [`RunErrorKind`]; after one the iterator ends. [`Steps::warnings`]
-    /// lists signs that the steps so far may be wrong.
+    /// The errors are those of [`run`](Self::run), as [`RunErrorKind`]; after one the iterator ends.
+    /// [`Steps::warnings`] lists signs that the steps so far may be wrong.
     ///
     /// A step in which an [event](Self::on) changes the state or a parameter has two more nodes, with the states
     /// before and after the event; after the node at which an event stops the run the iterator ends. [`Steps::events`]

@@ -120,8 +120,8 @@ impl<const N: usize, L: Length<N>> Deref for SectionPoint<N, L> {
     }
 }
 
-/// The iterator over the points of a Poincaré section; made by [`Simulation::section`]. Each item is a [`SectionPoint`], or
-/// the [`RunErrorKind`] after which it ends. It also ends where an event stops the motion.
+/// The iterator over the points of a Poincaré section; made by [`Simulation::section`]. Each item is a
+/// [`SectionPoint`], or the [`RunErrorKind`] after which it ends. It also ends where an event stops the motion.
 pub struct Section<'m, M, const N: usize, L = FixedLength>
 where
     M: Sectioned<N, L> + 'm,

@@ -27,8 +27,8 @@ use tfe_runtime::{Element, Mixed, Model, Solve};
 /// ∫₀¹ y φ' dτ + h Σ_l b_l f_l φ(c_l) = y₁ φ(1) − y₀ φ(0)     for all polynomials φ of degree n − 1       (T-31)
 /// ```
 ///
-/// with n nodes, and the points c_l and weights b_l of the element (`docs/theory.md` §2 and §6). The pages of the elements
-/// have their own forms, orders and stability.
+/// with n nodes, and the points c_l and weights b_l of the element (`docs/theory.md` §2 and §6). The pages of the
+/// elements have their own forms, orders and stability.
 ///
 /// All quantities are in consistent units: the time in the unit in which the model's parameters are given.
 ///
@@ -349,9 +349,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Adds an impulse: a generalized force that acts at the instant `time` and has the time integral `impulse`, one
     /// number for each coordinate, in units of that coordinate's momentum.
     ///
-    /// Inside an element the impulse is weighted by the test functions (T-49); at a node it changes the momentum there, and
-    /// the recorded node at that instant shows the momentum before the impulse. In a run backwards in time the impulse is
-    /// subtracted, as the effect of any force is.
+    /// Inside an element the impulse is weighted by the test functions (T-49); at a node it changes the momentum there,
+    /// and the recorded node at that instant shows the momentum before the impulse. In a run backwards in time the
+    /// impulse is subtracted, as the effect of any force is.
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -17,8 +17,8 @@ use std::fmt;
 use tfe_runtime::Share;
 use tfe_runtime::Statistics;
 
-/// An endless iterator over the nodes of a motion, made by [`Simulation::steps`](crate::Simulation::steps). Each item is a
-/// [`Node`], or the [`RunErrorKind`] after which it ends.
+/// An endless iterator over the nodes of a motion, made by [`Simulation::steps`](crate::Simulation::steps). Each item
+/// is a [`Node`], or the [`RunErrorKind`] after which it ends.
 pub struct Steps<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     way: Way<'m, M, N, L>,
     /// The velocity of the last node: the first guess for that of the next.

@@ -64,8 +64,8 @@ impl Element {
 }
 
 /// Whether an element or a motion over a time `h` that was solved again from `start` ends at `end` as before. The
-/// agreement asked for is far closer than that of two different solutions. Differences are relative to the larger one of
-/// start and end, since the motion may come to rest or pass the origin; both solutions may have the error of the
+/// agreement asked for is far closer than that of two different solutions. Differences are relative to the larger one
+/// of start and end, since the motion may come to rest or pass the origin; both solutions may have the error of the
 /// tolerance. In an equilibrium all numbers may be rounding errors of forces.
 pub(super) fn is_same<M, const N: usize, L>(
     model: &M,

@@ -88,8 +88,8 @@ impl Watch {
         (last != Some(number)).then_some(element)
     }
 
-    /// Warns of a growth that the model does not have; it belongs to the last warning if the element examined before was
-    /// unstable, too.
+    /// Warns of a growth that the model does not have; it belongs to the last warning if the element examined before
+    /// was unstable, too.
     fn judge(&mut self, element: Element, (t, h): (f64, f64), growth: Option<Growth>) {
         let continued = self.is_unstable;
         self.is_unstable = growth.is_some();

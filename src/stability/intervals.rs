@@ -48,8 +48,8 @@ pub struct UnstableInterval {
 ///
 /// A range may begin at zero, where a transition matrix is the identity: the matrix is not evaluated there.
 ///
-/// The cost is about a thousand evaluations of the matrix for one or two modes over a few unstable intervals, and tens of
-/// thousands for many modes that cross many times. More than 200 000 are an error.
+/// The cost is about a thousand evaluations of the matrix for one or two modes over a few unstable intervals, and tens
+/// of thousands for many modes that cross many times. More than 200 000 are an error.
 ///
 /// # Not guaranteed
 /// Modes that coincide for every parameter make ∏ (μᵢ − μⱼ)² vanish; a collision of other eigenvalues away from ±1 is

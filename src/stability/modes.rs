@@ -99,12 +99,14 @@ impl Mode {
         self.modulus().ln() / self.step
     }
 
-    /// The principal frequency ω = |arg λ| / |h|, in radians per unit of time, from 0 to π/|h|. Zero for positive λ, π/|h| for negative λ.
+    /// The principal frequency ω = |arg λ| / |h|, in radians per unit of time, from 0 to π/|h|. Zero for positive λ,
+    /// π/|h| for negative λ.
     pub fn frequency(&self) -> f64 {
         self.multiplier.arg().abs() / self.step.abs()
     }
 
-    /// The `count` lowest of the frequencies |ω + 2πk/h|, k = 0, −1, 1, −2, …, that have this multiplier; ascending, each once.
+    /// The `count` lowest of the frequencies |ω + 2πk/h|, k = 0, −1, 1, −2, …, that have this multiplier; ascending,
+    /// each once.
     pub fn frequencies(&self, count: usize) -> Vec<f64> {
         let angle = self.multiplier.arg().abs();
         let step = self.step.abs();
@@ -240,7 +242,8 @@ mod tests {
         };
         let matrix = transition_matrix(&model, Mixed::<6>, &REST, 0.0, 0.5).unwrap();
         let modes = modes(&matrix, 0.5).unwrap();
-        // −ξω ± ω√(ξ² − 1) = −2 and −½; the larger modulus last. |z| = 1 and the error of the Padé approximant 1e-10 of e^z.
+        // −ξω ± ω√(ξ² − 1) = −2 and −½; the larger modulus last. |z| = 1 and the error of the Padé approximant 1e-10 of
+        // e^z.
         let rates: Vec<_> = modes.iter().map(Mode::growth_rate).collect();
         assert!((rates[0] + 2.0).abs() < 1e-9 && (rates[1] + 0.5).abs() < 1e-9);
         for mode in modes {

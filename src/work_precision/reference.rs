@@ -23,8 +23,8 @@ pub enum Reference {
     Computed {
         /// The element.
         element: Element,
-        /// The longest step of the finer run, in units of time. Other steps are shorter, because the run has nodes at all
-        /// times at which runs are compared.
+        /// The longest step of the finer run, in units of time. Other steps are shorter, because the run has nodes at
+        /// all times at which runs are compared.
         step: f64,
         /// The estimated relative error: the difference of both runs at the end of the span, the larger one of
         /// coordinates (divided by the largest |q|) and momenta (divided by the largest |p|), but at least the rounding

@@ -133,8 +133,8 @@ mod tests {
     use crate::double_double::DoubleDouble;
     use crate::lanes::Lanes;
 
-    /// The angle of a point in double-double arithmetic: one step of Newton's method for sin (a − a₀) = (y cos a₀ − x sin a₀)/r from the angle of the system, sine and
-    /// cosine by series.
+    /// The angle of a point in double-double arithmetic: one step of Newton's method for sin (a − a₀) = (y cos a₀ − x
+    /// sin a₀)/r from the angle of the system, sine and cosine by series.
     fn exact(y: f64, x: f64) -> DoubleDouble {
         let first = f64::atan2(y, x);
         let (sin, cos) = exact_sin_cos(first);

@@ -6,8 +6,8 @@
 //! converged lane is held while the others go on, so that the result of a trajectory does not depend, not even in one
 //! bit, on the trajectories beside it. A lane whose iteration does not contract is given a stepper of its own, which
 //! takes this step and some that follow by Newton's method; if that fails as well, the trajectory ends there.
-//! So is a lane in which a coordinate is small beside the largest one, as an angle beside a distance: its iteration takes
-//! longer than those of the others.
+//! So is a lane in which a coordinate is small beside the largest one, as an angle beside a distance: its iteration
+//! takes longer than those of the others.
 //!
 //! Lanes are used for models without constraints: for every Lagrangian; for Hamiltonians with two-field elements, and
 //! with all other elements if their equations have the form M q̈ = f. Everything else is stepped lane by lane.

@@ -20,8 +20,8 @@ pub enum ModelError {
         /// Its value.
         length: usize,
     },
-    /// A range that ends below its start, or that is empty beyond the ends of the arrays that are summed; or a constraint
-    /// without sites.
+    /// A range that ends below its start, or that is empty beyond the ends of the arrays that are summed; or a
+    /// constraint without sites.
     EmptyRange {
         /// The range of the sum, `i in 0..n-1`; of a constraint or an output, the declaration, `constraint(rod[i in 0..n-1])`.
         ranges: &'static str,
@@ -97,8 +97,8 @@ pub enum ModelError {
     },
     /// No velocity belongs to a momentum, or no momentum to a velocity: ∂²/∂z∂z is singular, or values are not finite.
     NoVelocity,
-    /// The equations are not of the form M q̈ = f with a constant diagonal M, which is supported only for Lagrangians, with
-    /// the feature `sparse`.
+    /// The equations are not of the form M q̈ = f with a constant diagonal M, which is supported only for Lagrangians,
+    /// with the feature `sparse`.
     NotSecondOrder,
     /// The element is invalid.
     Element(ElementError),
@@ -285,8 +285,8 @@ pub mod checks {
         Ok(())
     }
 
-    /// Checks that the range of a sum does not end below its start. Where it is empty, loops add zero to the given places
-    /// of this many coordinates, which therefore have to exist.
+    /// Checks that the range of a sum does not end below its start. Where it is empty, loops add zero to the given
+    /// places of this many coordinates, which therefore have to exist.
     ///
     /// # Errors
     /// [`ModelError::EmptyRange`].
@@ -355,8 +355,8 @@ pub mod checks {
         i64::try_from(entry).map_or(LONGEST, |entry| entry.min(LONGEST))
     }
 
-    /// Checks that an array field is as long as the largest of its indices requires: (length, index, ranges) of each, with
-    /// a length below zero where a range ends below its start and needs nothing.
+    /// Checks that an array field is as long as the largest of its indices requires: (length, index, ranges) of each,
+    /// with a length below zero where a range ends below its start and needs nothing.
     ///
     /// # Errors
     /// [`ModelError::FieldLength`].

@@ -37,9 +37,9 @@ impl Solve {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Control {
     /// The error that may remain, relative to the largest coordinate, estimated from the last increments. With at most
-    /// 10⁻¹⁴, as by default, it is also relative to the own size of a coordinate below a 1024th of the largest one, as an
-    /// angle beside a distance of 10⁹ m; the elements of an array count as one coordinate. An iteration that has reached
-    /// round-off is accepted in any case.
+    /// 10⁻¹⁴, as by default, it is also relative to the own size of a coordinate below a 1024th of the largest one, as
+    /// an angle beside a distance of 10⁹ m; the elements of an array count as one coordinate. An iteration that has
+    /// reached round-off is accepted in any case.
     pub tolerance: f64,
     /// The largest number of iterations for one element.
     pub max_iterations: u32,

@@ -56,7 +56,8 @@ pub trait Controlled<const N: usize>: Model<N> + Send + Sync {
         second: &mut Second<R, N>,
     );
 
-    /// The partial derivatives of everything that [`first_with`](Self::first_with) gives by a parameter or by the time, at fixed inputs.
+    /// The partial derivatives of everything that [`first_with`](Self::first_with) gives by a parameter or by the time,
+    /// at fixed inputs.
     fn first_by_with<R: Real>(
         &self,
         _by: By,

@@ -403,7 +403,8 @@ mod tests {
 
     type Twice = Dual<Dual>;
 
-    /// ∂²f/∂x∂y at x = 0, y = 1/2: where x y stands inside another function its slope along y is zero, and the slope of that is not.
+    /// ∂²f/∂x∂y at x = 0, y = 1/2: where x y stands inside another function its slope along y is zero, and the slope of
+    /// that is not.
     #[test]
     fn second_derivatives_see_the_bend_of_what_has_no_slope() {
         let one = |value: f64| Twice::from_f64(value);
@@ -453,7 +454,8 @@ mod tests {
         }
     }
 
-    /// 1/√((1 − x)(1 + x)) and 1/((1 − x)(1 + x)) beside one, of the rounded x in 40 digits: by x² the last five would be lost.
+    /// 1/√((1 − x)(1 + x)) and 1/((1 − x)(1 + x)) beside one, of the rounded x in 40 digits: by x² the last five would
+    /// be lost.
     #[test]
     fn slopes_beside_one_have_all_digits() {
         let (below, above) = (Dual::new(1.0 - 1e-10, 1.0), Dual::new(1.0 + 1e-10, 1.0));

@@ -166,8 +166,8 @@ impl Element {
         Self::new(Family::Radau, nodes)
     }
 
-    /// The same with n − 1 Gauss points (reduced integration), by which a primal element becomes A-stable and the same map
-    /// as the mixed one.
+    /// The same with n − 1 Gauss points (reduced integration), by which a primal element becomes A-stable and the same
+    /// map as the mixed one.
     #[must_use]
     pub const fn reduced(self) -> Self {
         self.quadrature(self.nodes.saturating_sub(1))
@@ -253,8 +253,8 @@ impl Element {
     ///
     /// Mixed and energy-conserving elements integrate such models exactly with every rule that they accept, and then
     /// are the diagonal Padé approximant (T-53), and so are reduced primal elements. Radau elements are the subdiagonal
-    /// one of degrees (s − 1, s), with s Lobatto points that of degrees (s − 2, s). All of these map the left half plane
-    /// of λh into the unit disk. Only primal elements with other rules do not.
+    /// one of degrees (s − 1, s), with s Lobatto points that of degrees (s − 2, s). All of these map the left half
+    /// plane of λh into the unit disk. Only primal elements with other rules do not.
     #[must_use]
     pub const fn is_a_stable(&self) -> bool {
         match (self.family, self.rule) {
@@ -295,8 +295,8 @@ impl Element {
         }
     }
 
-    /// The order of accuracy in the states at the nodes, for smooth models: their error is O(h^order). With n nodes and the
-    /// default rule it is
+    /// The order of accuracy in the states at the nodes, for smooth models: their error is O(h^order). With n nodes and
+    /// the default rule it is
     ///
     /// ```text
     /// 2(n − 1) ,     Radau: 2n − 3 ,
@@ -463,8 +463,8 @@ pub mod markers {
         /// ∫ { L_v·δq̇ + (L_q + Q)·δq } dt = p₁·δq₁ − p₀·δq₀ ,   v = q̇                    (theory.md (T-4), the paper's (9))
         /// ```
         ///
-        /// Order 2(n − 1), symplectic. Stable up to a limit of the step only, with unstable intervals below it (T-57); with
-        /// [`reduced`](Self::reduced) quadrature it is A-stable and the same map as [`Mixed`].
+        /// Order 2(n − 1), symplectic. Stable up to a limit of the step only, with unstable intervals below it (T-57);
+        /// with [`reduced`](Self::reduced) quadrature it is A-stable and the same map as [`Mixed`].
         Primal, primal;
         /// Two-field form with n = `NODES` nodes and n − 1 Gauss points,
         ///
@@ -472,8 +472,8 @@ pub mod markers {
         /// ∫ { p·δq̇ − q·δṗ − H_p·δp + (Q − H_q)·δq } dt = [ p·δq − q·δp ]₀¹              (theory.md (T-5), the paper's (10))
         /// ```
         ///
-        /// Order 2(n − 1), symplectic, A-stable; conserves quadratic first integrals. It is the collocation method with n − 1
-        /// Gauss points.
+        /// Order 2(n − 1), symplectic, A-stable; conserves quadratic first integrals. It is the collocation method with
+        /// n − 1 Gauss points.
         Mixed, mixed;
         /// Three-field form with n = `NODES` nodes and n − 1 Gauss points: coordinates, velocities and momenta are
         /// independent,
@@ -482,17 +482,18 @@ pub mod markers {
         /// ∫ { p·δq̇ − q·δṗ + (L_q + Q)·δq − v·δp + (L_v − p)·δv } dt = [ p·δq − q·δp ]₀¹    (theory.md (T-3), the paper's (6))
         /// ```
         ///
-        /// The same map as [`Mixed`] where the mass matrix L_vv is regular; it may be singular where constraints determine
-        /// the motion. Order 2(n − 1), symplectic, A-stable.
+        /// The same map as [`Mixed`] where the mass matrix L_vv is regular; it may be singular where constraints
+        /// determine the motion. Order 2(n − 1), symplectic, A-stable.
         ThreeField, three_field;
-        /// Two-field form with n = `NODES` nodes, continuous trial and discontinuous test functions, and 2n Gauss points.
+        /// Two-field form with n = `NODES` nodes, continuous trial and discontinuous test functions, and 2n Gauss
+        /// points.
         ///
-        /// Order 2(n − 1), A-stable. The energy of an autonomous model changes by the work of the forces, up to the error of
-        /// the quadrature (theory.md (T-52)): exactly if H is a polynomial of degree at most 4n/(n − 1). Symplectic for
-        /// linear models only.
+        /// Order 2(n − 1), A-stable. The energy of an autonomous model changes by the work of the forces, up to the
+        /// error of the quadrature (theory.md (T-52)): exactly if H is a polynomial of degree at most 4n/(n − 1).
+        /// Symplectic for linear models only.
         EnergyConserving, energy_conserving;
-        /// Two-field form with n = `NODES` nodes, a jump on the left side only, and n − 1 right Radau points: the Radau IIA
-        /// method (theory.md §6.9).
+        /// Two-field form with n = `NODES` nodes, a jump on the left side only, and n − 1 right Radau points: the Radau
+        /// IIA method (theory.md §6.9).
         ///
         /// Order 2n − 3, A- and L-stable, not symplectic: it damps fast oscillations. For stiff damped models.
         Radau, radau;

@@ -465,7 +465,8 @@ mod tests {
         };
     }
 
-    /// Numbers between the bounds have values between the bounds of values, and slopes between those of slopes: wide and narrow enclosures, also beyond where functions are defined.
+    /// Numbers between the bounds have values between the bounds of values, and slopes between those of slopes: wide
+    /// and narrow enclosures, also beyond where functions are defined.
     #[test]
     fn values_and_slopes_are_within_their_bounds() {
         let functions = functions! {

@@ -8,12 +8,15 @@
 //! power:  xʸ = e^(y ln x), the exponent to twice the precision
 //! ```
 //!
-//! Q is Taylor's series up to r¹³/13!. ln 2 is taken in two parts, the first of 33 bits, so that n times it is exact, fused or not. The polynomial of the logarithm, and how
-//! its parts are put together, are those of fdlibm (K. C. Ng). A power multiplies what rounding takes from its logarithm, so that is computed with it, by fused operations; without the
-//! feature `simd`, where there are none, powers are left to the functions of the system. Arguments outside the limits below are rare and go to the functions of the system, lane by lane.
+//! Q is Taylor's series up to r¹³/13!. ln 2 is taken in two parts, the first of 33 bits, so that n times it is exact,
+//! fused or not. The polynomial of the logarithm, and how its parts are put together, are those of fdlibm (K. C. Ng). A
+//! power multiplies what rounding takes from its logarithm, so that is computed with it, by fused operations; without
+//! the feature `simd`, where there are none, powers are left to the functions of the system. Arguments outside the
+//! limits below are rare and go to the functions of the system, lane by lane.
 //!
-//! Judged in double-double arithmetic, the exponential is off by less than one unit in the last place, the logarithm by less than one, the tangent by less than
-//! three, the power by less than 1.2. A single number is left to the functions of the system.
+//! Judged in double-double arithmetic, the exponential is off by less than one unit in the last place, the logarithm by
+//! less than one, the tangent by less than three, the power by less than 1.2. A single number is left to the functions
+//! of the system.
 
 use crate::real::Real;
 use crate::trigonometry::{Turn, replace_outside, replace_outside_of_two};
@@ -420,7 +423,8 @@ mod tests {
     #[test]
     #[cfg(feature = "simd")]
     fn powers_are_good_to_a_unit() {
-        // Moderate ones, such as models have; bases of all sizes; bases near one with large exponents, where the logarithm is multiplied most.
+        // Moderate ones, such as models have; bases of all sizes; bases near one with large exponents, where the
+        // logarithm is multiplied most.
         let exponents = [0.5, -1.5, 2.5, 1.0 / 3.0, 3.0, -0.1, 7.3, 40.7];
         let moderate = (1..20_000).map(|k| (f64::from(k) * 3.7e-4, exponents[k as usize % 8]));
         let sizes = (-300..300).map(|k| (1.3 * 10.0_f64.powi(k), f64::from(k % 7) * 0.17 - 0.4));

@@ -7,7 +7,8 @@
 //! δy(τ) = δy₀ + Σ_m ∫₀^τ P_m δC_m ,     δC^q_m = h Σ_j R_mj δν_j ,     δC^p_m = h Σ_l R*_ml δF_l ,
 //! ```
 //!
-//! and a loss with derivatives S by C adds h Σ_m R_mj S^q_m to what it has of ν_j, and h Σ_m R*_ml S^p_m to what it has of F_l.
+//! and a loss with derivatives S by C adds h Σ_m R_mj S^q_m to what it has of ν_j, and h Σ_m R*_ml S^p_m to what it has
+//! of F_l.
 
 use crate::basis::{MAX_NODES, legendre_integrals};
 use crate::condense::{Direction, add_multiple};

@@ -12,7 +12,8 @@ pub struct RunTimeLength;
 
 /// A model declared by `#[dynamics]`, or by hand through [`Model`], of either kind of length.
 ///
-/// It lets one name, such as `Simulation::new`, stand for both kinds. N is the number of coordinates where that is constant, and 0 elsewhere.
+/// It lets one name, such as `Simulation::new`, stand for both kinds. N is the number of coordinates where that is
+/// constant, and 0 elsewhere.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` is not a model",
     label = "not a model",

@@ -263,7 +263,8 @@ mod tests {
         assert!(Block::of(&[[1e12, 1e-6], [1e12, 2e-6]]).is_ok());
     }
 
-    /// A body of one with a pendulum of a half, so short that its angle moves next to nothing: the matrix is as regular as of a long one.
+    /// A body of one with a pendulum of a half, so short that its angle moves next to nothing: the matrix is as regular
+    /// as of a long one.
     #[test]
     fn coordinates_may_have_any_units() {
         let length = 1e-17;

@@ -2,7 +2,8 @@
 //!
 //! A model is declared by its Lagrangian L(q, v, t) or by its Hamiltonian H(q, p, t). The generated
 //! kernels evaluate that function and its partial derivatives at one instant; everything else
-//! (Legendre transform, elements, Newton) lives in this crate. In the names below **z** stands for the velocity v of a Lagrangian and for the momentum p of a Hamiltonian.
+//! (Legendre transform, elements, Newton) lives in this crate. In the names below **z** stands for the velocity v of a
+//! Lagrangian and for the momentum p of a Hamiltonian.
 
 use crate::consistency::ModelError;
 use crate::input::{InputFailure, InputPanicked};
@@ -204,8 +205,9 @@ pub trait Model<const N: usize> {
     /// iteration of an element (T-162 of `docs/theory.md`). It is always correct to name none.
     const IGNORABLE: [bool; N] = [false; N];
 
-    /// Whether ∂²/∂z∂z is a diagonal matrix that is constant ([`Facts::constant_mass`]), whatever the parameters: nothing
-    /// is compiled that serves other mass matrices. It is always correct to say no; of one coordinate it is known.
+    /// Whether ∂²/∂z∂z is a diagonal matrix that is constant ([`Facts::constant_mass`]), whatever the parameters:
+    /// nothing is compiled that serves other mass matrices. It is always correct to say no; of one coordinate it is
+    /// known.
     const DIAGONAL_MASS: bool = false;
 
     /// L(q, v, t), or H(q, p, t).
@@ -259,12 +261,12 @@ pub trait Model<const N: usize> {
         second: &mut Second<R, N>,
     );
 
-    /// Checks fields that are lengths, indices or vectors: that every index which the declaration makes of them is inside
-    /// its array, and every vector as long as its largest index requires.
+    /// Checks fields that are lengths, indices or vectors: that every index which the declaration makes of them is
+    /// inside its array, and every vector as long as its largest index requires.
     ///
     /// Whatever takes a model and returns an error checks it once. Kernels do not: those of a model that does not pass
-    /// panic, and so may functions of the runtime that evaluate them directly. Models with hand-written kernels need not
-    /// implement it.
+    /// panic, and so may functions of the runtime that evaluate them directly. Models with hand-written kernels need
+    /// not implement it.
     ///
     /// # Errors
     /// [`ModelError`], which names the array, the sum and the index.
@@ -283,7 +285,8 @@ pub trait Model<const N: usize> {
     /// The partial derivatives of all results of [`first`](Self::first) by a parameter or by the time: ∂L_z/∂a,
     /// ∂L_q/∂a, ∂Q/∂a (or the same of H) at fixed (q, z).
     ///
-    /// Called only for the parameters of [`SENSITIVITIES`](Self::SENSITIVITIES), and, where there is at least one, for [`By::Time`].
+    /// Called only for the parameters of [`SENSITIVITIES`](Self::SENSITIVITIES), and, where there is at least one, for
+    /// [`By::Time`].
     fn first_by<R: Real>(
         &self,
         _by: By,

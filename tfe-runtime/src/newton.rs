@@ -269,10 +269,10 @@ impl Monitor {
         })
     }
 
-    /// Judges an increment, and, once increments relative to the largest coordinate have converged, what `own` computes: the
-    /// same relative to the size of each coordinate, where one is small beside the largest. From then on only these count,
-    /// which `settles` remembers: a local variable, so that models without small coordinates compile nothing of this. Rough
-    /// tolerances stay relative to the largest coordinate.
+    /// Judges an increment, and, once increments relative to the largest coordinate have converged, what `own`
+    /// computes: the same relative to the size of each coordinate, where one is small beside the largest. From then on
+    /// only these count, which `settles` remembers: a local variable, so that models without small coordinates compile
+    /// nothing of this. Rough tolerances stay relative to the largest coordinate.
     ///
     /// # Errors
     /// [`StepError::NonFinite`].
@@ -303,8 +303,8 @@ impl Monitor {
         self.last = 1.0;
     }
 
-    /// Judges an increment relative to the size of each coordinate. Rounding errors of larger coordinates may keep it above
-    /// the tolerance: the iteration ends where such increments do not shrink.
+    /// Judges an increment relative to the size of each coordinate. Rounding errors of larger coordinates may keep it
+    /// above the tolerance: the iteration ends where such increments do not shrink.
     ///
     /// # Errors
     /// [`StepError::NonFinite`].

@@ -19,8 +19,8 @@ pub trait Precise: Real {
         (high, (self - (high - part)) + (other - part))
     }
 
-    /// The same if the magnitude of `self` is not below that of `smaller`; otherwise the error is not exact, but correct
-    /// to the working precision of `smaller`.
+    /// The same if the magnitude of `self` is not below that of `smaller`; otherwise the error is not exact, but
+    /// correct to the working precision of `smaller`.
     #[inline(always)]
     fn exact_sum_with(self, smaller: Self) -> (Self, Self) {
         let high = self + smaller;

@@ -45,7 +45,8 @@ pub struct Structure {
     pub conserved: &'static [&'static str],
     /// The second derivative by z is diagonal: where it is constant as well, no matrix is inverted.
     pub diagonal_mass: bool,
-    /// The energy function alone. Loops count once for each pass through their body where the length is known, once otherwise.
+    /// The energy function alone. Loops count once for each pass through their body where the length is known, once
+    /// otherwise.
     pub value: Operations,
     /// First derivatives and forces.
     pub first: Operations,

@@ -144,7 +144,8 @@ where
 
     /// Writes the derivative of the end of the last step by its start and by g directions, 2N × (2N + g), row by row.
     ///
-    /// `extra` needs [`linearised_len`] numbers; `impulses` are those of the step, and do not move with directions that move its time.
+    /// `extra` needs [`linearised_len`] numbers; `impulses` are those of the step, and do not move with directions that
+    /// move its time.
     ///
     /// # Errors
     /// As [`transition`](Self::transition).

@@ -4,11 +4,13 @@
 //! x = n π/2 + y ,   |y| ≤ π/4 ,   sin y and cos y by polynomials, exchanged and negated as n mod 4 says.
 //! ```
 //!
-//! π/2 is taken in three parts of 53 bits: x less n times the first is exact by a fused operation, and y keeps its digits near the zeros, with a
-//! second word for what rounding takes. Without the feature `simd`, where nothing is fused, there are four parts of 33 bits and more, so that n times
-//! the first three is exact. The four parts and the minimax polynomials are those of fdlibm (S. Moshier's and K. C. Ng's forms of the remainder), which are accurate to 2⁻⁵⁸; products and sums in a row are fused. The loops have no calls and no branches, so that the compiler makes vector instructions of them
-//! on every target.
-//! Arguments beyond [`LIMIT`] and those that are not finite are rare and go to the functions of the system.
+//! π/2 is taken in three parts of 53 bits: x less n times the first is exact by a fused operation, and y keeps its
+//! digits near the zeros, with a second word for what rounding takes. Without the feature `simd`, where nothing is
+//! fused, there are four parts of 33 bits and more, so that n times the first three is exact. The four parts and the
+//! minimax polynomials are those of fdlibm (S. Moshier's and K. C. Ng's forms of the remainder), which are accurate to
+//! 2⁻⁵⁸; products and sums in a row are fused. The loops have no calls and no branches, so that the compiler makes
+//! vector instructions of them on every target. Arguments beyond [`LIMIT`] and those that are not finite are rare and
+//! go to the functions of the system.
 //!
 //! Where only one of the two is needed, a reduction by π serves, and one polynomial:
 //!
@@ -16,12 +18,13 @@
 //! x = n π + y ,   |y| ≤ π/2 ,   sin x = (−1)ⁿ sin y ;        cos x = (−1)ⁿ sin(n π + π/2 − x) .
 //! ```
 //!
-//! x − n π₁ is exact by a fused operation, π₁ being π rounded, for all n here; two more parts of π leave y a rounding of its own. That takes a third
-//! of the operations of both together. Without the feature `simd` one comes from both.
+//! x − n π₁ is exact by a fused operation, π₁ being π rounded, for all n here; two more parts of π leave y a rounding
+//! of its own. That takes a third of the operations of both together. Without the feature `simd` one comes from both.
 //!
-//! Measured over two million arguments, what gives both differs from the functions of the system, which are good to less than a unit in the last place, by one such unit
-//! at most, and at one argument in twenty; what gives one is off by less than 1.5 such units, judged in double-double arithmetic, and loses the sign
-//! of zero. A single number is left to those functions: alone, it is faster there.
+//! Measured over two million arguments, what gives both differs from the functions of the system, which are good to
+//! less than a unit in the last place, by one such unit at most, and at one argument in twenty; what gives one is off
+//! by less than 1.5 such units, judged in double-double arithmetic, and loses the sign of zero. A single number is left
+//! to those functions: alone, it is faster there.
 
 use crate::real::{Real, fused};
 

@@ -48,8 +48,8 @@ impl Way<'_> {
         nodes
     }
 
-    /// Converts the longest steps of attempts, as [taken](Self::taken), to the units of time; returns the shortest and the
-    /// longest step of the last one.
+    /// Converts the longest steps of attempts, as [taken](Self::taken), to the units of time; returns the shortest and
+    /// the longest step of the last one.
     pub(super) fn measure(&mut self, attempts: &mut [Attempt]) -> (f64, f64) {
         let mut extremes = (self.step, self.step);
         for attempt in attempts {

@@ -11,8 +11,8 @@ use tfe_runtime::Element;
 /// The results of runs with decreasing steps.
 pub(super) struct Ladder {
     pub(super) order: f64,
-    /// The order for graded meshes whose steps are long relative to fast time scales: one more than that of the solution
-    /// inside an element.
+    /// The order for graded meshes whose steps are long relative to fast time scales: one more than that of the
+    /// solution inside an element.
     pub(super) reduced: f64,
     pub(super) accuracy: f64,
     pub(super) attempts: Vec<Attempt>,

@@ -263,8 +263,9 @@ impl<'r> Noting<'r> {
         }
     }
 
-    /// The error of a search. Where steps below a rounding of the span would be needed, these are no steps of the motion:
-    /// the state does not change in them, as where friction holds a body at rest. Why longer steps fail tells more.
+    /// The error of a search. Where steps below a rounding of the span would be needed, these are no steps of the
+    /// motion: the state does not change in them, as where friction holds a body at rest. Why longer steps fail tells
+    /// more.
     pub(super) fn explained(self, error: RunErrorKind) -> RunErrorKind {
         match (error, self.failure) {
             (RunErrorKind::TooManySteps { span, step }, Some(failure))

@@ -20,13 +20,13 @@ where
     M: Simulated<N, L>,
     L: Length<N>,
 {
-    /// Asks for an accuracy: the run then chooses the element and the step size such that the estimated error is at most
-    /// `accuracy`, a number between 0 and 1.
+    /// Asks for an accuracy: the run then chooses the element and the step size such that the estimated error is at
+    /// most `accuracy`, a number between 0 and 1.
     ///
     /// The error is relative, and estimated at the times at which the runs are compared: the error of the coordinates
     /// divided by the largest coordinate, of the momenta divided by the largest momentum, and of each declared output
-    /// divided by its largest value. The motion carries its estimate, and [`Estimated::picked`] says what was chosen and
-    /// why.
+    /// divided by its largest value. The motion carries its estimate, and [`Estimated::picked`] says what was chosen
+    /// and why.
     ///
     /// An element set before is kept, and a step size set before is the largest one allowed. Two to four runs over the
     /// span are made with shorter and shorter steps, and one more for verification: over the same steps with an

@@ -1,5 +1,5 @@
-//! Passes an element in which events are looked for. What is done there sees the model and the observer of the run through
-//! [`Passing`]: it is compiled once for a number of coordinates, and not for every model.
+//! Passes an element in which events are looked for. What is done there sees the model and the observer of the run
+//! through [`Passing`]: it is compiled once for a number of coordinates, and not for every model.
 
 use super::{Broken, Left, Observe, Pieces, Planned, Side, Solver, left};
 use crate::error::RunErrorKind;

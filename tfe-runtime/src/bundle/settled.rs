@@ -11,8 +11,8 @@ impl<M, const N: usize> Step<'_, M, N>
 where
     M: Model<N>,
 {
-    /// The lanes that have arrived, without those in which a coordinate is small beside the largest one. Their iteration
-    /// would have to go on, which that of a stepper of their own does.
+    /// The lanes that have arrived, without those in which a coordinate is small beside the largest one. Their
+    /// iteration would have to go on, which that of a stepper of their own does.
     #[inline(always)]
     pub(super) fn settled<V: Eight>(
         &self,

@@ -1,4 +1,5 @@
-//! Which rows are independent, in the units that the kinetic energy gives to coordinates where their lengths do not tell.
+//! Which rows are independent, in the units that the kinetic energy gives to coordinates where their lengths do not
+//! tell.
 
 use super::constrains::Constrains;
 use super::node::is_regular;
@@ -13,8 +14,8 @@ const NOISE: f64 = 1e-13;
 const CLEAR: f64 = 1e-6;
 
 /// As [`Rows::choose`], but independent of units. Beside angles, the lengths of 1e-11 m in `x - r*cos(a)` and
-/// `x - l*cos(b)` are so small that both rows seem to be equal. So if rows were left out whose orthogonal parts are more
-/// than rounding errors, coordinates are measured in the square roots of their inertias.
+/// `x - l*cos(b)` are so small that both rows seem to be equal. So if rows were left out whose orthogonal parts are
+/// more than rounding errors, coordinates are measured in the square roots of their inertias.
 ///
 /// Returns the units in which all marked rows are independent; ones unless more rows were found in other units.
 pub(crate) fn choose<const N: usize>(

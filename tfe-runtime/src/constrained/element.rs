@@ -1,5 +1,5 @@
-//! The equations of an element with constraints (T-72, T-73, T-80): positions by the variational rows, velocities by the
-//! symmetric ones.
+//! The equations of an element with constraints (T-72, T-73, T-80): positions by the variational rows, velocities by
+//! the symmetric ones.
 //!
 //! ```text
 //! rows     Σ_l P_il (L_v + A_Sᵀ μ)_l − h Σ_l G_il (L_q + Q + Ȧ_Sᵀ μ − A_Vᵀ μ̇)_l = p₀ + A₀,Sᵀ η_S − A₀,Vᵀ μ₀

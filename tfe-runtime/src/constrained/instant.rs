@@ -152,7 +152,8 @@ fn spread<const N: usize>(
     if rank == rows.len() {
         return Ok(multipliers.to_vec());
     }
-    // Rows are divided by their lengths if products of these would overflow, lose digits, or stand beside much larger ones; else by one.
+    // Rows are divided by their lengths if products of these would overflow, lose digits, or stand beside much larger
+    // ones; else by one.
     let mut lengths: Vec<f64> = rows.iter().map(norm).collect();
     let (mut shortest, mut longest) = (f64::INFINITY, 0.0_f64);
     for length in lengths.iter().filter(|length| **length != 0.0) {
@@ -214,14 +215,16 @@ fn spread<const N: usize>(
     }
 }
 
-/// Pivots of CᵀC below this part of what was subtracted on the way to them have lost digits: the squares of rows of different scales stand beside one another there.
+/// Pivots of CᵀC below this part of what was subtracted on the way to them have lost digits: the squares of rows of
+/// different scales stand beside one another there.
 const LOST: f64 = 1e-4;
 
 /// The least λ with Cᵀλ = μ by C = Q R, λ = Q R⁻ᵀ μ: no squares.
 #[cold]
 #[inline(never)]
 fn least(mut combinations: Vec<Vec<f64>>, multipliers: &[f64]) -> Vec<f64> {
-    // Twice is enough for orthogonality to rounding where lengths are alike; rows of different scales lose digits in the first pass.
+    // Twice is enough for orthogonality to rounding where lengths are alike; rows of different scales lose digits in
+    // the first pass.
     const PASSES: usize = 3;
     let mut weights = multipliers.to_vec();
     for column in 0..weights.len() {

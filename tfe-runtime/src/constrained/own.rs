@@ -7,8 +7,8 @@ use super::rows::Rows;
 /// (T-165): whether by positions, and the relative violation. `None` without the standard library, on which enclosures
 /// of these terms depend.
 ///
-/// `left` is the error that iterations may leave, relative to all positions and velocities. The rows have been evaluated
-/// as declared, if they are given.
+/// `left` is the error that iterations may leave, relative to all positions and velocities. The rows have been
+/// evaluated as declared, if they are given.
 pub(crate) fn violated<const N: usize>(
     model: &dyn Constrains<N>,
     t: f64,

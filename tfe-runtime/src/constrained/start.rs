@@ -66,12 +66,12 @@ fn start_residuals_of<const N: usize>(
     residuals
 }
 
-/// The violation of each constraint relative to the size of its own terms, by positions and by velocities (T-165). Zeros
-/// for constraints on velocities.
+/// The violation of each constraint relative to the size of its own terms, by positions and by velocities (T-165).
+/// Zeros for constraints on velocities.
 ///
-/// Relative to the extent of all positions, a unit quaternion or a rod of one metre beside x = 1.5e11 m would be accepted
-/// with any error. With the gradient A, the second derivatives φ_qq, and the size of the terms of φ from an enclosure of
-/// its formula, the scales are
+/// Relative to the extent of all positions, a unit quaternion or a rod of one metre beside x = 1.5e11 m would be
+/// accepted with any error. With the gradient A, the second derivatives φ_qq, and the size of the terms of φ from an
+/// enclosure of its formula, the scales are
 ///
 /// ```text
 /// S = Σ_j |A_j| min(|q|, |A| / |φ_qq,j|) + terms   for |φ| ,     max(|A| |v| + |a|, S/h)   for |A v + a| ,
@@ -160,8 +160,8 @@ fn beside_own<const N: usize>(
         if !declared[c].kind.is_holonomic() {
             return (0.0, 0.0);
         }
-        // The enclosure of a sum is wider than its value by the rounding errors of its terms. An infinite one says nothing
-        // of them, and nothing is refused.
+        // The enclosure of a sum is wider than its value by the rounding errors of its terms. An infinite one says
+        // nothing of them, and nothing is refused.
         let terms = (bounds.high() - bounds.low()) / f64::EPSILON;
         of_row(&mut rows, model, c, t, at, scales, terms)
     };

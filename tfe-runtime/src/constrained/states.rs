@@ -19,7 +19,8 @@ pub struct Residual {
     pub position: f64,
     /// A v + a
     pub velocity: f64,
-    /// The distance |φ| / |A| relative to the positions; of a start relative to what the constraint is made of, where that is more.
+    /// The distance |φ| / |A| relative to the positions; of a start relative to what the constraint is made of, where
+    /// that is more.
     pub relative_position: f64,
     /// |A v + a| / |A| relative to the velocities; of a start likewise.
     pub relative_velocity: f64,
@@ -124,7 +125,8 @@ fn evaluated<'a, const N: usize>(
     rows
 }
 
-/// The velocity that belongs to a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, the Legendre transform.
+/// The velocity that belongs to a momentum: L_v(q, v, t) + Aᵀν = p, A v + a = 0 (T-74). Without constraints, the
+/// Legendre transform.
 ///
 /// # Errors
 /// [`StepError`] if there is none: the kinetic energy is singular for motions that the constraints allow.

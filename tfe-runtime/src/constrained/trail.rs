@@ -7,8 +7,8 @@ use crate::model::{Constraint, Model};
 use crate::scheme::{MAX_RATES, SchemeRef};
 use alloc::vec::Vec;
 
-/// The polynomials of rates and multipliers of the elements of a run; written by [`Stepper::leave`](crate::step::Stepper::leave), read by
-/// [`Stepper::foresee`](crate::step::Stepper::foresee).
+/// The polynomials of rates and multipliers of the elements of a run; written by
+/// [`Stepper::leave`](crate::step::Stepper::leave), read by [`Stepper::foresee`](crate::step::Stepper::foresee).
 #[derive(Clone, Debug, Default)]
 pub struct Trail {
     /// Start and length of each element.

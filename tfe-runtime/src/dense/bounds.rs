@@ -279,7 +279,8 @@ pub struct LongArguments<R> {
     pub p: Vec<R>,
 }
 
-/// The polynomials of an element of many coordinates: Legendre coefficients of the rates of coordinates and momenta, a row of n each, and its ends.
+/// The polynomials of an element of many coordinates: Legendre coefficients of the rates of coordinates and momenta, a
+/// row of n each, and its ends.
 pub(crate) struct Rows<'a> {
     pub(crate) times: (f64, f64),
     pub(crate) length: f64,
@@ -359,7 +360,8 @@ mod tests {
     use super::*;
     use crate::model::State;
 
-    /// Elements of random coefficients: what they do in a part is within the bounds of that part, and these are not much wider where parts are short.
+    /// Elements of random coefficients: what they do in a part is within the bounds of that part, and these are not
+    /// much wider where parts are short.
     #[test]
     fn elements_stay_within_their_bounds() {
         let mut seed = 3_u64;

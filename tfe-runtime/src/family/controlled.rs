@@ -4,7 +4,8 @@ use super::model::{Entries, Gradient, Model, Sweep};
 use crate::controlled::MAX_INPUTS;
 use crate::real::Real;
 
-/// The kernels of a model of run-time length with inputs u: L(q, v, t, u) or H(q, p, t, u), forces Q(q, z, t, u) and observables.
+/// The kernels of a model of run-time length with inputs u: L(q, v, t, u) or H(q, p, t, u), forces Q(q, z, t, u) and
+/// observables.
 ///
 /// `#[dynamics]` implements it for declarations with `input(…)`. The model itself, as a [`Model`], is the one all of
 /// whose inputs are zero. Each kernel is that of [`Model`] with the inputs as an additional argument before the others,

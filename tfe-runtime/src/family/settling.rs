@@ -31,8 +31,8 @@ impl Declarations {
         self.0.len() > 2 && !(least > ALIKE * most)
     }
 
-    /// The largest increment relative to the size of its declaration; `None` where none is small beside the largest one.
-    /// `of` gives the size and the increment of a coordinate; sizes up to `noise` are those of rounding errors.
+    /// The largest increment relative to the size of its declaration; `None` where none is small beside the largest
+    /// one. `of` gives the size and the increment of a coordinate; sizes up to `noise` are those of rounding errors.
     pub(super) fn own_increment(
         &self,
         noise: f64,

@@ -282,7 +282,8 @@ impl<'m, M: Model> Stepper<'m, M> {
         }
     }
 
-    /// The polynomial of the last step, from time `start` to time `end`; before the first step, and after a failed one, a constant.
+    /// The polynomial of the last step, from time `start` to time `end`; before the first step, and after a failed one,
+    /// a constant.
     #[must_use]
     pub fn dense(&self, start: f64, end: f64) -> DenseElement {
         DenseElement::of_pieces((start, end), self.pieces.clone())

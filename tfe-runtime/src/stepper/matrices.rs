@@ -46,7 +46,8 @@ where
         self.linearise(&[], matrix)
     }
 
-    /// Writes the derivative of the end of the last step by its start and by g directions, 2N × (2N + g), row by row, the first columns and all rows ordered (p, q).
+    /// Writes the derivative of the end of the last step by its start and by g directions, 2N × (2N + g), row by row,
+    /// the first columns and all rows ordered (p, q).
     ///
     /// Impulses stay at their times, and so do the crossings of kinks at which the step was cut.
     ///

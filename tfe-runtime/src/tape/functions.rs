@@ -265,7 +265,8 @@ mod tests {
         adjoints[0]
     }
 
-    /// As of dual numbers: powers that vanish, whose exponent is a parameter, and roots and lengths of zero that no parameter moves.
+    /// As of dual numbers: powers that vanish, whose exponent is a parameter, and roots and lengths of zero that no
+    /// parameter moves.
     #[test]
     fn what_vanishes_has_no_part() {
         let x = [0.0, 1.0, 4.0, 16.0];
