@@ -22,6 +22,7 @@ mod moving;
 pub(crate) mod orbit;
 mod phase;
 pub(crate) mod problem;
+pub(crate) mod repeats;
 mod rest;
 mod sensitive;
 mod setup;

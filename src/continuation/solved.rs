@@ -45,6 +45,7 @@ pub(super) fn solved<M: Model<N> + Clone, const N: usize>(
         model: &problem.model,
         ..problem.orbit.clone()
     };
+    orbit.check_repeats(&iterate)?;
     let floquet = multipliers_of(&orbit, &iterate.nodes, &transitions)?;
     let trivial = trivial_of(&floquet, orbit.trivial());
     let slope = tangent.globals.last().copied().unwrap_or(f64::NAN);

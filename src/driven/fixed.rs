@@ -95,6 +95,8 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         self.model.second_with(&inputs, t, q, z, first, second);
     }
 
+    const GIVEN_INPUTS: bool = true;
+
     fn shares_inputs(&self, other: &Self) -> bool {
         self.sources.are_those_of(&other.sources)
     }

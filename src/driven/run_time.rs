@@ -12,6 +12,8 @@ impl<M: Controlled> Declared<0> for Driven<'_, M, RunTimeLength> {
 impl<M: Controlled> Model for Driven<'_, M, RunTimeLength> {
     /// Catches a panic of an input function. The guard surrounds a whole step, so that single calls cost nothing; after
     /// a panic the caller discards what is incomplete.
+    const GIVEN_INPUTS: bool = true;
+
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Result<T, InputPanicked> {
         self.sources.guarded(f)
     }

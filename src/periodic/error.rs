@@ -25,6 +25,16 @@ pub enum OrbitError {
         /// The number given.
         value: f64,
     },
+    /// The equations of motion are others after the period, at the coordinates grown by the
+    /// [`advance`](super::PeriodicOrbit::advance): the state closes, but the motion does not repeat.
+    NotRepeated {
+        /// The period given, or that of the parameter.
+        period: f64,
+        /// The time from which a period leads to the largest difference.
+        time: f64,
+        /// The difference of the rates dp/dt and dq/dt, as part of the largest along the orbit.
+        off: f64,
+    },
     /// The model depends on time: the period of its orbits is that of the forcing (or a multiple), not an unknown.
     ForcedPeriod,
     /// The mesh is invalid.
@@ -118,6 +128,13 @@ impl fmt::Display for OrbitError {
             Self::Number { what, value } => {
                 write!(f, "the {what} is {}, it must be finite", Short(*value))
             }
+            Self::NotRepeated { period, time, off } => write!(
+                f,
+                "the model does not repeat after the period {}: from t = {} to a period later, the rates of the motion change by {off:.1e} of their size; \
+                 give a multiple of the period of the forces, with all its digits, and an `.advance(…)` that changes nothing",
+                Short(*period),
+                Short(*time)
+            ),
             Self::ForcedPeriod => f.write_str(
                 "the model depends on time, so its orbits have the period of the forcing: give it with `.period(T)`",
             ),

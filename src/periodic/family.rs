@@ -9,6 +9,7 @@ use super::kind::Chained;
 use super::orbit::Orbit;
 use super::phase::Period;
 use super::problem::Global;
+use super::repeats::check_repeats;
 use super::rest::{Extent, is_at_rest, may_rest};
 use super::setup::{Guess, PeriodicOrbit};
 use crate::assembly::Mesh;
@@ -79,6 +80,9 @@ impl<'m, M: family::Model> PeriodicOrbit<'m, M, 0, RunTimeLength> {
             return Err(OrbitError::AtRest);
         }
         solved?;
+        let times = shooting.mesh.times(shooting.start, shooting.period);
+        let nodes: Vec<_> = times.zip(shooting.nodes.iter().cloned()).collect();
+        check_repeats(self.model, &nodes, shooting.period, |_| 0.0)?;
         Ok(shooting)
     }
 

@@ -3,6 +3,7 @@
 use super::error::OrbitError;
 use super::orbit::{Verdict, sort, trivial_of};
 use super::phase::Period;
+use super::repeats::{check_repeats, rate};
 use super::rest::{Extent, is_at_rest};
 use super::setup::{PeriodicOrbit, check_advance};
 use crate::assembly::{MeshError, check_tolerance};
@@ -313,17 +314,21 @@ where
         Ok(run)
     }
 
+    /// The growth of a coordinate over a period.
+    fn grown(&self, a: usize) -> f64 {
+        self.advance.as_ref().map_or(0.0, |all| all.as_ref()[a])
+    }
+
     /// y(T) − y(0) − (0, advance), in the order (p, q), divided by the scales.
     fn residual(&self, run: &Linearised<N, L>, scales: &Scales) -> DVector<f64> {
         let (first, last) = (&run.motion().states()[0], run.motion().last());
         let n = first.q.as_ref().len();
-        let grown = |a: usize| self.advance.as_ref().map_or(0.0, |grown| grown.as_ref()[a]);
         let change = |of: fn(&Node<N, L>) -> &L::Vector, a: usize| -> f64 {
             of(last).as_ref()[a] - of(first).as_ref()[a]
         };
         DVector::from_fn(2 * n, |row, _| match row.checked_sub(n) {
             None => change(|node| &node.p, row) / scales.of(row),
-            Some(a) => (change(|node| &node.q, a) - grown(a)) / scales.of(row),
+            Some(a) => (change(|node| &node.q, a) - self.grown(a)) / scales.of(row),
         })
     }
 
@@ -339,6 +344,10 @@ where
                 value: left.value,
             });
         }
+        let nodes = run.motion().states().iter();
+        let nodes: Vec<_> = nodes.map(|node| (node.t, node.state())).collect();
+        let model = self.simulation.model();
+        check_repeats(model, &nodes, period, |a| self.grown(a))?;
         let mut floquet = run.multipliers().map_err(OrbitError::Multipliers)?;
         sort(&mut floquet);
         let (motion, transitions) = run.into_parts();
@@ -492,17 +501,6 @@ where
         own.map(|index| model.parameter_value(index)) != Some(one.value)
     });
     left.map(|(_, one)| one)
-}
-
-/// The flow ẏ = (ṗ, q̇), in the order (p, q).
-fn rate<M, L, const N: usize>(model: &M, node: &Node<N, L>) -> DVector<f64>
-where
-    M: Differentiable<N, L>,
-    L: Length<N>,
-{
-    let of_p = model.momentum_rate(node);
-    let (of_p, of_q) = (of_p.as_ref(), node.v.as_ref());
-    DVector::from_iterator(2 * of_q.len(), of_p.iter().chain(of_q).copied())
 }
 
 /// A state plus a change of its components, which are counted in the order (p, q).

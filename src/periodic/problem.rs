@@ -2,6 +2,7 @@
 
 use super::error::OrbitError;
 use super::phase::Phase;
+use super::repeats::check_repeats;
 use crate::assembly::{ClosureMut, DenseMut, Iterate, Mesh, Problem, Solution};
 use crate::motion::Node;
 use crate::numbers::norm;
@@ -86,6 +87,13 @@ impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
     /// Checks that a solution is an orbit.
     pub(crate) fn check(&self) -> Result<(), OrbitError> {
         check(self.period, self.unfolding, self.inertia)
+    }
+
+    /// Checks that the model is the same a period later.
+    pub(crate) fn check_repeats(&self, iterate: &Iterate<N>) -> Result<(), OrbitError> {
+        let times = self.mesh.times(self.start, self.period);
+        let nodes: Vec<_> = times.zip(iterate.nodes.iter().copied()).collect();
+        check_repeats(self.model, &nodes, self.period, |a| self.advance[a])
     }
 
     /// The row Σ h_e ẏ_e · δy_e = 0 for few elements, with the flow from the equations of motion.

@@ -267,6 +267,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// [`Unsupported`](OrbitError::Unsupported); [`Guess`](OrbitError::Guess) if the run of the guess fails.
     /// [`Assembly`](OrbitError::Assembly), [`NoFamily`](OrbitError::NoFamily) or [`AtRest`](OrbitError::AtRest) if no orbit
     /// is found from the guess (`Assembly` also for an invalid model or element);
+    /// [`NotRepeated`](OrbitError::NotRepeated) if the state closes after the period, but the model is another one then;
     /// [`Constraints`](OrbitError::Constraints) or [`Multipliers`](OrbitError::Multipliers) if the orbit is found, but not
     /// its multipliers.
     pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
@@ -345,6 +346,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             return Err(OrbitError::AtRest);
         }
         solved?;
+        problem.check_repeats(&iterate)?;
         Ok((problem, iterate, assembly))
     }
 

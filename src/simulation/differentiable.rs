@@ -29,6 +29,9 @@ pub trait Differentiable<const N: usize, L: Length<N>>: Simulated<N, L> {
     /// Whether the equations of motion contain the time.
     const DEPENDS_ON_TIME: bool;
 
+    /// Whether functions or tables give the inputs of the model.
+    const GIVEN_INPUTS: bool;
+
     /// The state with all coordinates and momenta zero.
     fn zero_state(&self) -> L::State;
 
@@ -61,6 +64,7 @@ pub trait Differentiable<const N: usize, L: Length<N>>: Simulated<N, L> {
 
 impl<M: Model<N>, const N: usize> Differentiable<N, FixedLength> for M {
     const DEPENDS_ON_TIME: bool = M::FACTS.time_dependent;
+    const GIVEN_INPUTS: bool = M::GIVEN_INPUTS;
 
     fn zero_state(&self) -> State<N> {
         State {
@@ -103,6 +107,7 @@ impl<M: Model<N>, const N: usize> Differentiable<N, FixedLength> for M {
 #[cfg(feature = "sparse")]
 impl<M: family::Model> Differentiable<0, RunTimeLength> for M {
     const DEPENDS_ON_TIME: bool = M::FACTS.time_dependent || M::MOMENTA_MOVE;
+    const GIVEN_INPUTS: bool = M::GIVEN_INPUTS;
 
     fn zero_state(&self) -> FamilyState {
         let zeros = || vec![0.0; self.len()];

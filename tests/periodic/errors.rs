@@ -457,3 +457,63 @@ fn tolerances_that_are_none_are_refused() {
         }
     }
 }
+
+/// A state that closes after some time is no orbit of a model whose forces have another period then, nor where the
+/// growth of the coordinates changes the forces.
+#[test]
+fn models_that_do_not_repeat_have_no_orbit() {
+    let period = TAU / FORCED.omega;
+    for wrong in [2.0, 0.99 * period, 1.001 * period, 1.5 * period, 1e-6] {
+        let error = PeriodicOrbit::of(&FORCED).period(wrong).solve().err();
+        let error = error.expect("another period");
+        assert!(matches!(error, OrbitError::NotRepeated { .. }), "{error}");
+        assert!(
+            error.to_string().contains("does not repeat after"),
+            "{error}"
+        );
+    }
+    let simulation = Simulation::new(&FORCED);
+    let hybrid = PeriodicOrbit::of_simulation(&simulation).period(0.99 * period);
+    let error = hybrid.solve().expect_err("another period");
+    assert!(matches!(error, OrbitError::NotRepeated { .. }), "{error}");
+    // Multiples, also late, where the phase of the forces is rounded, and a period with six digits.
+    let six = (period * 1e6).round() / 1e6;
+    for (start, right) in [
+        (0.0, 2.0 * period),
+        (1e8, period),
+        (-0.3, 7.0 * period),
+        (0.0, six),
+    ] {
+        let orbit = PeriodicOrbit::of(&FORCED).period(right).start_time(start);
+        let told = orbit.elements(80).solve().err();
+        assert!(told.is_none(), "{start} {right}: {told:?}");
+    }
+    // A pendulum turns by 2π, not by 6.
+    let turning = |turn: f64| {
+        let orbit = PeriodicOrbit::of(&PENDULUM).unknown_period(2.0);
+        let orbit = orbit.advance([turn]).energy(4.0);
+        let guess = move |t: f64| ([turn * t / 2.0], [turn / 2.0]);
+        orbit.guess(guess).solve().err()
+    };
+    assert_eq!(turning(TAU), None);
+    assert_eq!(turning(-2.0 * TAU), None);
+    let error = turning(6.0).expect("another pendulum");
+    assert!(matches!(error, OrbitError::NotRepeated { .. }), "{error}");
+}
+
+/// A branch whose period is not that of the forces ends where it ceases to be.
+#[test]
+fn branches_of_a_wrong_period_end() {
+    let period = TAU / FORCED.omega;
+    let branch = Continuation::of(&FORCED).parameter(|model: &mut Duffing| &mut model.omega);
+    let branch = branch.range(FORCED.omega..2.0 * FORCED.omega);
+    let error = branch.period(|_| period).run().expect_err("another period");
+    let last = error.partial().points().last().expect("the first orbit");
+    // The phase of the forces is off by less than the ten-thousandth that is accepted.
+    assert!(
+        (last.parameter - FORCED.omega).abs() * period <= 2e-4,
+        "{last:?}"
+    );
+    let told = error.to_string();
+    assert!(told.contains("does not repeat after"), "{told}");
+}

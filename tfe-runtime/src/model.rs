@@ -297,6 +297,10 @@ pub trait Model<const N: usize> {
     ) {
     }
 
+    /// Whether functions or tables give the inputs of this model ([`Controlled`](crate::Controlled)); they need not be
+    /// defined at times that are not asked for.
+    const GIVEN_INPUTS: bool = false;
+
     /// Whether the kernels of this model and of another one of the same type use the same functions for their inputs,
     /// so that runs of both may be made side by side. Only models with given inputs ([`Controlled`](crate::Controlled))
     /// can differ in them.

@@ -211,6 +211,10 @@ pub trait Model: Declared<0, Length = RunTimeLength> {
         None
     }
 
+    /// Whether functions or tables give the inputs of this model ([`Controlled`](crate::family::Controlled)); they need not be
+    /// defined at times that are not asked for.
+    const GIVEN_INPUTS: bool = false;
+
     /// Calls `f`, in which the model is evaluated, and returns its result. Models that call user functions for their
     /// inputs catch panics of these; all others only call `f`.
     ///
