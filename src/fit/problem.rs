@@ -45,6 +45,26 @@ impl Compared {
         columns.all(|column| unit(column.as_slice()).dot(&residuals).abs() <= PERPENDICULAR)
     }
 
+    /// By how much an unknown alone has to change for the least sum of squares, to first order; zero if that changes the
+    /// sum by nothing that counts.
+    fn step_of(&self, place: usize) -> f64 {
+        /// The least cosine of the angle between residuals and their derivatives that counts.
+        const SLANTED: f64 = 1e-4;
+
+        let column = self.slopes.column(place);
+        let sizes = [norm(&self.residuals), norm(column.as_slice())];
+        if !sizes.iter().all(|size| *size > 0.0) {
+            return 0.0;
+        }
+        let pairs = column.iter().zip(&self.residuals);
+        let cosine: f64 = pairs.map(|(s, r)| (s / sizes[1]) * (r / sizes[0])).sum();
+        if cosine.abs() > SLANTED {
+            -cosine * (sizes[0] / sizes[1])
+        } else {
+            0.0
+        }
+    }
+
     /// The covariance matrix s² (JᵀJ)⁻¹ (T-126), and the square roots of its diagonal, whose squares may underflow.
     fn covariance(&self, names: &[String]) -> Result<(DMatrix<f64>, Vec<f64>), FitError> {
         /// Singular values below this, relative to the largest and for columns normalised to one, are due to rounding
@@ -143,15 +163,79 @@ impl<'r> Least<'r> {
         least.first = (norm(&start.residuals) / least.unit).powi(2);
         least.here = Some(start);
         least.note();
+        least.release();
         Ok(least)
     }
 
-    pub(super) fn solve(self) -> Result<Solved, FitError> {
+    /// Moves unknowns at a bound, where the variables have no rate, away from it if that reduces the sum of squares.
+    /// Returns whether there were any; if the run there fails, nothing is moved.
+    fn release(&mut self) -> bool {
+        /// The part of the way to the least sum of squares; the next step goes there.
+        const PART: f64 = 0.25;
+
+        let Some(here) = &self.here else {
+            return false;
+        };
+        let values = self.unknowns.values(self.numbers.as_slice()).0;
+        let mut numbers = self.numbers.clone();
+        let mut is_moved = false;
+        for (place, value) in values.into_iter().enumerate() {
+            let distance = PART * here.step_of(place);
+            if let Some(number) = self.unknowns.released(place, value, distance) {
+                numbers[place] = number;
+                is_moved = true;
+            }
+        }
+        if !is_moved {
+            return false;
+        }
+        let before = (self.numbers.clone(), self.here.take(), self.failure.take());
+        self.set_params(&numbers);
+        if self.here.is_none() {
+            (self.numbers, self.here, self.failure) = before;
+            return false;
+        }
+        true
+    }
+
+    /// The root of the sum of squares; infinite if the last run failed.
+    fn size(&self) -> f64 {
+        (self.here.as_ref()).map_or(f64::INFINITY, |here| norm(&here.residuals))
+    }
+
+    pub(super) fn solve(mut self) -> Result<Solved, FitError> {
+        /// The number of times that unknowns are moved away from bounds.
+        const RELEASES: u32 = 20;
+        /// The least decrease of the residuals for which they are moved once more.
+        const GAIN: f64 = 0.995;
+
+        let mut reason = self.minimised();
+        for _ in 0..RELEASES {
+            let (before, size) = (self.numbers.clone(), self.size());
+            let kept = self.failure.clone();
+            if !self.release() {
+                break;
+            }
+            let next = self.minimised();
+            let is_less = self.size() < size;
+            if is_less {
+                reason = next;
+            } else {
+                self.failure = kept;
+                self.set_params(&before);
+            }
+            if !(self.size() < GAIN * size) {
+                break;
+            }
+        }
+        self.finished(&reason)
+    }
+
+    /// Follows the method of Levenberg and Marquardt from the present unknowns; returns why it ended.
+    fn minimised(&mut self) -> TerminationReason {
         /// The relative changes of the sum of squares and of the unknowns at which the iteration ends; far below the
         /// effect of noise.
         const TOLERANCE: f64 = 1e-12;
-        /// The number of trials that decide at the end, including the run to which the iteration returns.
-        const LAST_TRIALS: usize = 3;
 
         let method = LevenbergMarquardt::new()
             .with_ftol(TOLERANCE)
@@ -159,7 +243,14 @@ impl<'r> Least<'r> {
             .with_gtol(TOLERANCE)
             // The first steps are of the size of the unknowns, not the default of a hundred times that.
             .with_stepbound(1.0);
-        let (done, report) = method.minimize(self);
+        method.minimize(Follower(self)).1.termination
+    }
+
+    /// The result of the iteration.
+    fn finished(self, reason: &TerminationReason) -> Result<Solved, FitError> {
+        /// The number of trials that decide at the end, including the run to which the iteration returns.
+        const LAST_TRIALS: usize = 3;
+
         use TerminationReason::{Converged, NoImprovementPossible, Orthogonal, ResidualsZero};
         let Self {
             unknowns,
@@ -168,9 +259,8 @@ impl<'r> Least<'r> {
             failure,
             trials,
             ..
-        } = done;
+        } = self;
         let values = unknowns.values(numbers.as_slice()).0;
-        let reason = report.termination;
         let converged = matches!(
             reason,
             ResidualsZero | Orthogonal | Converged { .. } | NoImprovementPossible(_)
@@ -194,7 +284,7 @@ impl<'r> Least<'r> {
                 why: match failure {
                     Some(FitError::Run(kind)) => format!("runs nearby fail, {kind}"),
                     Some(_) => "outputs nearby are not finite".to_owned(),
-                    None => told(&reason),
+                    None => told(reason),
                 },
             });
         };
@@ -259,11 +349,7 @@ fn unit_of(start: &Compared) -> f64 {
     exponent.exp2()
 }
 
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Least<'_> {
-    type ResidualStorage = VecStorage<f64, Dyn, U1>;
-    type JacobianStorage = VecStorage<f64, Dyn, Dyn>;
-    type ParameterStorage = VecStorage<f64, Dyn, U1>;
-
+impl Least<'_> {
     fn set_params(&mut self, numbers: &DVector<f64>) {
         if self.numbers == *numbers && self.here.is_some() {
             return;
@@ -278,25 +364,38 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Least<'_> {
         };
         self.note();
     }
+}
+
+/// The problem as the solver library asks for it.
+struct Follower<'a, 'r>(&'a mut Least<'r>);
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Follower<'_, '_> {
+    type ResidualStorage = VecStorage<f64, Dyn, U1>;
+    type JacobianStorage = VecStorage<f64, Dyn, Dyn>;
+    type ParameterStorage = VecStorage<f64, Dyn, U1>;
+
+    fn set_params(&mut self, numbers: &DVector<f64>) {
+        self.0.set_params(numbers);
+    }
 
     fn params(&self) -> DVector<f64> {
-        self.numbers.clone()
+        self.0.numbers.clone()
     }
 
     /// If the run fails, residuals so large that the trial is refused.
     fn residuals(&self) -> Option<DVector<f64>> {
-        Some(match &self.here {
-            Some(here) => DVector::from_column_slice(&here.residuals) / self.unit,
-            None => DVector::from_element(self.count, 1e6 * (1.0 + self.first)),
+        Some(match &self.0.here {
+            Some(here) => DVector::from_column_slice(&here.residuals) / self.0.unit,
+            None => DVector::from_element(self.0.count, 1e6 * (1.0 + self.0.first)),
         })
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let here = self.here.as_ref()?;
-        let (_, rates) = self.unknowns.values(self.numbers.as_slice());
+        let here = self.0.here.as_ref()?;
+        let (_, rates) = self.0.unknowns.values(self.0.numbers.as_slice());
         let (rows, columns) = here.slopes.shape();
         Some(DMatrix::from_fn(rows, columns, |row, column| {
-            here.slopes[(row, column)] / self.unit * rates[column]
+            here.slopes[(row, column)] / self.0.unit * rates[column]
         }))
     }
 }

@@ -105,25 +105,41 @@ impl Way {
             }
         };
         let value = (self.origin + more).clamp(self.low, self.high);
+        // At a bound the rounding error of the angle would count as a rate.
+        let is_inside = self.low < value && value < self.high;
+        let rate = if is_inside { rate } else { 0.0 };
         (self.sign * value, self.sign * rate)
     }
 
-    /// The variable u of a value x. At a bound dx/du would vanish, so u is moved slightly inside.
-    fn number(self, x: f64) -> f64 {
-        const INSIDE: f64 = 1e-2;
+    /// The value x moved by a distance away from a bound to which it is nearer than that, though not beyond the middle of
+    /// the bounds; `None` elsewhere.
+    fn released(self, x: f64, distance: f64) -> Option<f64> {
+        let (value, step) = (self.sign * x, self.sign * distance);
+        let (above, below) = (value - self.low, self.high - value);
+        let (passed, room) = if step > 0.0 {
+            (above, below)
+        } else {
+            (below, above)
+        };
+        let moved = value + step.signum() * step.abs().min(0.5 * room);
+        let is_inside = self.low < moved && moved < self.high;
+        (passed < step.abs() && is_inside).then_some(self.sign * moved)
+    }
 
+    /// The variable u of a value x.
+    fn number(self, x: f64) -> f64 {
         let value = self.sign * x;
         let more = value - self.origin;
         match self.shape {
             Shape::Free => x,
-            Shape::Beyond { shift, .. } if value <= self.low => INSIDE - shift,
+            Shape::Beyond { shift, .. } if value <= self.low => -shift,
             Shape::Beyond { unit, shift } => {
                 let part = more / unit;
                 let change = part * (2.0 * shift.hypot(1.0) + part);
                 change / ((shift * shift + change).max(0.0).sqrt() + shift)
             }
-            Shape::Between { shift, .. } if value <= self.low => INSIDE - shift,
-            Shape::Between { shift, .. } if value >= self.high => FRAC_PI_2 - INSIDE - shift,
+            Shape::Between { shift, .. } if value <= self.low => -shift,
+            Shape::Between { shift, .. } if value >= self.high => FRAC_PI_2 - shift,
             Shape::Between { width, .. } => {
                 // The sine of the difference of two angles, from their sines and cosines.
                 let [from, to] = [self.origin, value].map(|at| {
@@ -215,6 +231,13 @@ impl Unknowns {
     pub(super) fn values(&self, numbers: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let ways = self.ways.iter().zip(numbers);
         ways.map(|(way, u)| way.value(*u)).unzip()
+    }
+
+    /// The unbounded variable of a value of one unknown, moved by a distance away from a bound that is nearer than that;
+    /// `None` if there is none.
+    pub(super) fn released(&self, place: usize, value: f64, distance: f64) -> Option<f64> {
+        let way = self.ways[place];
+        Some(way.number(way.released(value, distance)?))
     }
 
     /// The unbounded variables of the first values.
