@@ -36,8 +36,8 @@ pub enum InputError {
         name: String,
         /// A time at which it was to be sampled.
         time: f64,
-        /// The reason.
-        why: &'static str,
+        /// The reason, with the numbers that are not possible.
+        why: String,
     },
     /// An input was set to a number that is not finite.
     NotFinite {
@@ -50,8 +50,8 @@ pub enum InputError {
     Table {
         /// The input.
         name: String,
-        /// The reason.
-        why: &'static str,
+        /// The reason, with the numbers that are not possible.
+        why: String,
     },
 }
 

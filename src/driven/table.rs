@@ -1,5 +1,7 @@
 //! Tables of inputs: values at given times and their interpolation.
 
+use crate::numbers::Short;
+
 /// How an input is interpolated between the times of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
@@ -26,15 +28,26 @@ impl Table {
         times: &[f64],
         values: &[f64],
         interpolation: Interpolation,
-    ) -> Result<Self, &'static str> {
+    ) -> Result<Self, String> {
         if times.is_empty() || times.len() != values.len() {
-            return Err("there must be as many values as times, and at least one");
+            return Err(format!(
+                "there must be as many values as times, and at least one, but there are {} times and {} values",
+                times.len(),
+                values.len()
+            ));
         }
-        if !times.iter().chain(values).all(|number| number.is_finite()) {
-            return Err("all numbers must be finite");
+        for (kind, numbers) in [("time", times), ("value", values)] {
+            if let Some(at) = numbers.iter().position(|number| !number.is_finite()) {
+                let number = Short(numbers[at]);
+                return Err(format!("its {kind} [{at}] is {number}, but must be finite"));
+            }
         }
-        if !times.is_sorted_by(|a, b| a < b) {
-            return Err("the times must increase");
+        if let Some(at) = times.windows(2).position(|pair| !(pair[0] < pair[1])) {
+            let (first, second) = (Short(times[at]), Short(times[at + 1]));
+            return Err(format!(
+                "the times must increase, but its time [{}] is {second} after {first}",
+                at + 1
+            ));
         }
         let pieces = match interpolation {
             Interpolation::Hold => vec![[0.0; 3]; times.len() - 1],
@@ -264,5 +277,13 @@ mod tests {
         assert!(new(&[0.0, 0.0], &[0.0, 1.0]) && new(&[0.0, f64::NAN], &[0.0, 1.0]));
         assert!(new(&[0.0, 1.0], &[0.0, f64::INFINITY]));
         assert!(!new(&[3.0], &[1.0]));
+        // The reason names the numbers.
+        let told = |times: &[f64], values: &[f64]| {
+            let table = Table::new(times, values, Interpolation::Hold);
+            table.expect_err("no table")
+        };
+        assert!(told(&[0.0, 2.5, 2.5], &[1.0; 3]).contains("its time [2] is 2.5 after 2.5"));
+        assert!(told(&[0.0, 1.0], &[1.0, f64::NAN]).contains("its value [1] is NaN"));
+        assert!(told(&[0.0], &[1.0, 2.0]).contains("1 times and 2 values"));
     }
 }

@@ -1,6 +1,7 @@
 //! Measured data.
 
 use super::error::FitError;
+use crate::numbers::Short;
 use tfe_runtime::Model;
 
 /// The measured values of one output, as given.
@@ -55,17 +56,26 @@ impl<'a> Column<'a> {
                 }
             })?),
         };
+        let unusable = |number: &f64| !number.is_finite();
         let why = if times.len() != values.len() {
-            Some("the numbers of times and values differ")
+            let (times, values) = (times.len(), values.len());
+            Some(format!("there are {times} times and {values} values"))
         } else if times.is_empty() {
-            Some("there is none")
-        } else if !times.iter().chain(values).all(|number| number.is_finite()) {
-            Some("not all times and values are finite")
+            Some("there is none".to_owned())
+        } else if let Some(at) = times.iter().position(unusable) {
+            let time = Short(times[at]);
+            Some(format!("its time [{at}] is {time}, but must be finite"))
+        } else if let Some(at) = values.iter().position(unusable) {
+            let (value, time) = (Short(values[at]), Short(times[at]));
+            Some(format!(
+                "its value [{at}], at t = {time}, is {value}, but must be finite"
+            ))
         } else if !(*deviation > 0.0 && deviation.is_normal()) {
             // Divided by a number below all normal ones, most residuals would be infinite.
-            Some(
-                "the standard deviation must be positive, finite and not below 2.3e-308: give it in the unit of the output",
-            )
+            Some(format!(
+                "the standard deviation is {}, but must be positive, finite and not below 2.3e-308: give it in the unit of the output",
+                Short(*deviation)
+            ))
         } else {
             None
         };

@@ -34,8 +34,8 @@ pub enum FitError {
     Measured {
         /// The output.
         name: String,
-        /// The reason.
-        why: &'static str,
+        /// The reason, with the first number that cannot be used.
+        why: String,
     },
     /// A range does not contain the value at which the fit of its parameter starts, or belongs to a parameter that is
     /// not fitted.

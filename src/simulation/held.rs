@@ -7,6 +7,7 @@ use crate::error::RunErrorKind;
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
 use crate::motion::Node;
+use crate::numbers::Short;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -165,16 +166,22 @@ where
         law: impl FnMut(&HeldNode<N, L>) -> f64 + Send + 'm,
     ) -> Result<(), RunErrorKind> {
         let place = place(M::INPUTS, input).map_err(RunErrorKind::Input)?;
-        let refused = |why| {
+        let refused = |why: String| {
             let (name, time) = (input.to_owned(), self.node.t);
             RunErrorKind::Input(InputError::Sampling { name, time, why })
         };
         if !(period > 0.0 && period.is_finite()) {
-            return Err(refused("the period must be positive and finite"));
+            let period = Short(period);
+            return Err(refused(format!(
+                "the period is {period}, but must be positive and finite"
+            )));
         }
         // No step is as short as a rounding of the time.
         if self.node.t + period == self.node.t || !period.is_normal() {
-            return Err(refused("the period is below a rounding of the time"));
+            let period = Short(period);
+            return Err(refused(format!(
+                "the period {period} is below a rounding of the time"
+            )));
         }
         self.samplers.push(Sampler {
             place,
@@ -205,7 +212,10 @@ where
                 return Err(InputError::Sampling {
                     name: name(),
                     time: self.node.t,
-                    why: "a sample lies within the step before: the period must be a multiple of the step",
+                    why: format!(
+                        "a sample lies within the step before, {} before this time: the period must be a multiple of the step",
+                        Short(late * period)
+                    ),
                 });
             }
             let value = (sampler.law)(&self.node);

@@ -32,11 +32,11 @@ fn misuse_is_told() {
     };
     assert_eq!(
         table(&[0.0, 1.0], &[1.0]),
-        "the table of input `u` is invalid: there must be as many values as times, and at least one"
+        "the table of input `u` is invalid: there must be as many values as times, and at least one, but there are 2 times and 1 values"
     );
     assert_eq!(
         table(&[0.0, 0.0], &[1.0, 2.0]),
-        "the table of input `u` is invalid: the times must increase"
+        "the table of input `u` is invalid: the times must increase, but its time [1] is 0 after 0"
     );
     // Without a value of the input there is no state; the error says at which time and for which input.
     let nan = Simulation::new(&DRIVING)
