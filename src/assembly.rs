@@ -15,9 +15,11 @@ mod mesh;
 mod newton;
 mod resolved;
 mod solution;
+mod warning;
 
 pub use error::AssemblyError;
 pub use mesh::MeshError;
+pub use warning::MeshWarning;
 
 pub(crate) use chain::{Chain, ClosureMut, DenseMut};
 pub(crate) use control::{Control, check_tolerance};

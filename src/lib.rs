@@ -34,7 +34,7 @@ pub mod stability;
 mod velocity;
 pub mod work_precision;
 
-pub use assembly::{AssemblyError, MeshError};
+pub use assembly::{AssemblyError, MeshError, MeshWarning};
 pub use boundary::{BoundaryMotion, BoundaryValue};
 pub use constraints::{
     Consistent, ConsistentError, ConsistentState, ConstraintResidual, Reactions,

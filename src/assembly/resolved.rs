@@ -7,8 +7,10 @@
 use super::chain::Chain;
 use super::convergence::Size;
 use super::error::AssemblyError;
-use super::newton::{Assembly, Problem};
-use tfe_runtime::Element;
+use super::newton::{Assembly, Iterate, Problem};
+use super::warning::MeshWarning;
+use crate::numbers::{larger, raise, smaller};
+use tfe_runtime::{Element, State};
 
 /// Below this pivot ratio a solution is checked: it may be a thousand times as large as the prescribed values.
 const DOUBTFUL: f64 = 1e-3;
@@ -20,6 +22,13 @@ const ROUNDINGS: f64 = 1e-6;
 /// The largest relative change by one correction on a mesh of half the element length. A solution that is due to the
 /// discretisation error grows by the factor by which the error decreases, at least four.
 const LEFT: f64 = 0.5;
+
+/// The largest change by that correction without a warning, relative to the extent of the motion; runs have the same
+/// limit (T-121).
+const FARTHEST: f64 = 0.03;
+
+/// The least extent, relative to the values themselves: that of a motion at rest is its rounding errors.
+const LEAST: f64 = 1e-6;
 
 impl Chain {
     /// Whether the equations are so close to singular that the solution should be checked.
@@ -80,5 +89,63 @@ impl<const N: usize> Assembly<N> {
         Err(AssemblyError::Singular {
             iterations: self.corrections(),
         })
+    }
+
+    /// The warnings for a solution, given as a curve with its global unknowns, by one Newton correction on a mesh of half
+    /// the element length (`fine`). If there is no correction, there are none.
+    pub(crate) fn doubts<P: Problem<N>>(
+        element: Element,
+        (fine, elements): (&P, usize),
+        (globals, dense): (Vec<f64>, usize),
+        curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
+    ) -> Vec<MeshWarning> {
+        let Ok(mut halves) = Self::new::<P::Model>(element, elements, globals.len(), dense) else {
+            return Vec::new();
+        };
+        let Ok(iterate) = halves.along(fine, curve, globals) else {
+            return Vec::new();
+        };
+        let change = match halves.linearise(fine, &iterate) {
+            Ok(()) => halves.part_of_extent(fine, &iterate),
+            Err(AssemblyError::Singular { .. }) => f64::INFINITY,
+            Err(_) => return Vec::new(),
+        };
+        let warning = MeshWarning::Unresolved {
+            elements: elements / 2,
+            change,
+        };
+        // A NaN is no solution, of which the iteration has told.
+        if change > FARTHEST {
+            vec![warning]
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// The size of the last correction: of coordinates and momenta relative to their extents, of global unknowns relative
+    /// to their scales.
+    fn part_of_extent<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> f64 {
+        let kinds: [fn(&State<N>) -> &[f64; N]; 2] = [|state| &state.p, |state| &state.q];
+        let mut most = 0.0;
+        for (kind, of) in kinds.into_iter().enumerate() {
+            let (mut extent, mut correction) = (0.0, 0.0);
+            for a in 0..N {
+                let values = || iterate.nodes.iter().map(|node| of(node)[a]);
+                let high = values().fold(f64::NEG_INFINITY, larger);
+                let low = values().fold(f64::INFINITY, smaller);
+                raise(&mut extent, high - low);
+                raise(&mut extent, LEAST * larger(high.abs(), low.abs()));
+                for e in 0..iterate.nodes.len() {
+                    raise(&mut correction, self.chain().node(e)[kind * N + a].abs());
+                }
+            }
+            if extent > 0.0 {
+                raise(&mut most, correction / extent);
+            }
+        }
+        for (k, correction) in self.chain().globals().iter().enumerate() {
+            raise(&mut most, (correction / problem.scale(k)).abs());
+        }
+        most
     }
 }

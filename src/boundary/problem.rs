@@ -1,8 +1,8 @@
 //! Boundary-value problems: the problem, its equations and its solution.
 
 use crate::assembly::{
-    Assembly, AssemblyError, ClosureMut, Control, Curve, Iterate, Mesh, MeshError, Problem,
-    Solution,
+    Assembly, AssemblyError, ClosureMut, Control, Curve, Iterate, Mesh, MeshError, MeshWarning,
+    Problem, Solution,
 };
 use crate::motion::{Motion, Node};
 use crate::numbers::Short;
@@ -322,12 +322,14 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         };
         // With all conditions at one end, the problem is regular for every span.
         let at_end = self.conditions.iter().filter(|one| one.at_end).count();
+        let motion = solution.motion();
+        let along = |t: f64| along_motion(self.model, &motion, t);
+        let fine = (&halves, 2 * self.elements);
         if (1..2 * N).contains(&at_end) && assembly.is_doubtful() {
-            let motion = solution.motion();
-            let along = |t: f64| along_motion(self.model, &motion, t);
-            assembly.check_resolved(self.element, (&halves, 2 * self.elements), along)?;
+            assembly.check_resolved(self.element, fine, along)?;
         }
-        Ok(BoundaryMotion { solution })
+        let warnings = Assembly::doubts(self.element, fine, (Vec::new(), 0), along);
+        Ok(BoundaryMotion { solution, warnings })
     }
 
     pub(super) fn problem(&self) -> Result<Spanned<'_, M, N>, BoundaryError> {
@@ -431,6 +433,7 @@ impl<M: Model<N>, const N: usize> Problem<N> for Spanned<'_, M, N> {
 #[derive(Clone, Debug)]
 pub struct BoundaryMotion<'m, M, const N: usize> {
     pub(super) solution: Solution<'m, M, N>,
+    warnings: Vec<MeshWarning>,
 }
 
 impl<M: Model<N>, const N: usize> BoundaryMotion<'_, M, N> {
@@ -452,6 +455,12 @@ impl<M: Model<N>, const N: usize> BoundaryMotion<'_, M, N> {
     /// The transition matrices of the elements, in order: 2N × 2N each, ordered (p, q).
     pub fn transitions(&self) -> Vec<DMatrix<f64>> {
         self.solution.matrices()
+    }
+
+    /// What makes the motion doubtful: whether elements of half the length change it, by one correction of Newton's
+    /// method.
+    pub fn warnings(&self) -> &[MeshWarning] {
+        &self.warnings
     }
 
     /// Counts of iterations, evaluations and factorisations of the solution.

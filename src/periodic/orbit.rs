@@ -3,7 +3,7 @@
 use super::error::OrbitError;
 use super::kind::{Chained, Closed};
 use super::problem::{Global, Periodic};
-use crate::assembly::{Assembly, Iterate};
+use crate::assembly::{Assembly, Iterate, MeshWarning};
 use crate::constraints::reduced;
 use crate::length::FixedLength;
 use crate::motion::{Motion, Node};
@@ -22,6 +22,7 @@ pub struct Orbit<'m, M: 'm, const N: usize, L: Closed<M, N> = FixedLength> {
     multipliers: Vec<Complex<f64>>,
     trivial: usize,
     unfolding: Option<f64>,
+    warnings: Vec<MeshWarning>,
 }
 
 /// The stability of a periodic orbit, by its Floquet multipliers.
@@ -124,7 +125,20 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
             floquet,
             trivial,
             unfolding,
+            warnings: Vec::new(),
         }
+    }
+
+    /// The orbit with what makes it doubtful.
+    pub(super) fn with_warnings(self, warnings: Vec<MeshWarning>) -> Self {
+        Self { warnings, ..self }
+    }
+
+    /// What makes the orbit doubtful: whether elements of half the length change it, by one correction of Newton's
+    /// method. Orbits of a [branch](crate::Branch) have [warnings of their own](crate::Branch::warnings), and those of
+    /// models of run-time length have none.
+    pub fn warnings(&self) -> &[MeshWarning] {
+        &self.warnings
     }
 
     /// The period T, as given or as found.
@@ -292,7 +306,8 @@ impl<'m, M, const N: usize, L: Closed<M, N>> fmt::Display for Orbit<'m, M, N, L>
             Verdict::Stable { margin } => write!(f, "  stable, margin {margin:.1e}"),
             Verdict::Neutral { .. } => write!(f, "  neutrally stable"),
             Verdict::Unstable { margin } => write!(f, "  unstable, margin {margin:.1e}"),
-        }
+        }?;
+        (self.warnings.iter()).try_for_each(|warning| write!(f, "\n  {warning}"))
     }
 }
 

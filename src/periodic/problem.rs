@@ -78,6 +78,18 @@ impl<'m, M, const N: usize> Periodic<'m, M, N> {
     }
 }
 
+impl<M, const N: usize> Periodic<'_, M, N> {
+    /// The same equations on elements of half the length.
+    pub(crate) fn halved(&self) -> Self {
+        Self {
+            model: self.model,
+            mesh: self.mesh.halved(),
+            globals: self.globals.clone(),
+            ..*self
+        }
+    }
+}
+
 impl<M: Model<N>, const N: usize> Periodic<'_, M, N> {
     /// The number of equations over all nodes.
     pub(crate) fn dense(&self) -> usize {

@@ -46,7 +46,9 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     pub fn solve_sensitive(&self) -> Result<SensitiveOrbit<Orbit<'m, M, N>, N>, OrbitError> {
         let (problem, iterate, assembly) = self.solved()?;
         let element = self.method().0;
+        let warnings = self.doubts(&problem, &iterate);
         let orbit = Orbit::new(element, &problem, iterate.clone(), &assembly)?;
+        let orbit = orbit.with_warnings(warnings);
         let indices: Vec<usize> = (0..self.model.parameters()).collect();
         let mut by: Vec<By> = indices.iter().copied().map(By::Parameter).collect();
         if !problem.globals.contains(&Global::Period) {

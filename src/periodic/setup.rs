@@ -6,7 +6,7 @@ use super::orbit::Orbit;
 use super::phase::{Period, Phase};
 use super::problem::{Global, Periodic, inertia_of};
 use super::rest::{Extent, is_at_rest, may_rest};
-use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh};
+use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshWarning};
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Motion;
 use crate::simulation::Simulation;
@@ -272,7 +272,22 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// its multipliers.
     pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
         let (problem, iterate, assembly) = self.solved()?;
-        Orbit::new(self.element, &problem, iterate, &assembly)
+        let warnings = self.doubts(&problem, &iterate);
+        let orbit = Orbit::new(self.element, &problem, iterate, &assembly)?;
+        Ok(orbit.with_warnings(warnings))
+    }
+
+    /// The warnings for an orbit.
+    pub(super) fn doubts(
+        &self,
+        problem: &Periodic<'_, M, N>,
+        iterate: &Iterate<N>,
+    ) -> Vec<MeshWarning> {
+        let motion = self.motion_of(problem, iterate);
+        let along = |t: f64| along_motion(self.model, &motion, t);
+        let fine = (&problem.halved(), 2 * self.elements);
+        let unknowns = (iterate.globals.clone(), problem.dense());
+        Assembly::doubts(self.element, fine, unknowns, along)
     }
 
     /// Solves the equations.
@@ -360,18 +375,7 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         if !assembly.is_doubtful() {
             return Ok(());
         }
-        let halves = Periodic {
-            model: problem.model,
-            mesh: problem.mesh.halved(),
-            start: problem.start,
-            period: problem.period,
-            unfolding: problem.unfolding,
-            inertia: problem.inertia,
-            globals: Vec::new(),
-            advance: problem.advance,
-            phase: None,
-            energy: None,
-        };
+        let halves = problem.halved();
         let motion = self.motion_of(problem, iterate);
         let along = |t: f64| along_motion(self.model, &motion, t);
         assembly.check_resolved(self.element, (&halves, 2 * self.elements), along)

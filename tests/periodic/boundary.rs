@@ -275,3 +275,31 @@ fn a_projectile_in_a_short_time() {
         assert!((vy * time / 2.0 - 1.0).abs() < 1e-13, "{time:e}: {vy:e}");
     }
 }
+
+/// Elements that are too long give another solution: it has a warning, and those that are short enough have none.
+#[test]
+fn solutions_that_the_elements_do_not_resolve_are_told() {
+    // x = A cos t + B sin t with x(0) = 0, x(T) = 1 has the momentum 1/sin T at the start.
+    let oscillator = Mathieu { a: 1.0, q: 0.0 };
+    let between = |end: f64| {
+        let arc = BoundaryValue::of(&oscillator).from_to([0.0], [1.0], 0.0..end);
+        arc.solve().expect("an arc")
+    };
+    for end in [1.0_f64, 10.0, 20.0, 100.0, 160.0, 1000.0] {
+        let arc = between(end);
+        let off = (arc.start().p[0] * end.sin() - 1.0).abs();
+        let told = arc.warnings();
+        assert!(off <= 0.03 || !told.is_empty(), "{end}: {off}");
+        assert!(off > 1e-3 || told.is_empty(), "{end}: {off}, {told:?}");
+    }
+    let told = between(1000.0).warnings()[0].to_string();
+    assert!(
+        told.starts_with("40 elements do not resolve the motion"),
+        "{told}"
+    );
+    // All conditions at the start: a run of a single element.
+    let start = PENDULUM.state([2.0], [0.0]);
+    let single = BoundaryValue::of(&PENDULUM).elements(1);
+    let single = single.initial(start, 0.0..20.0).solve().expect("a motion");
+    assert_eq!(single.warnings().len(), 1);
+}
