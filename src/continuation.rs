@@ -27,7 +27,7 @@
 //!
 //! # Resolution
 //! Some orbits are compared with the orbits of elements of half the length at the same place of the branch,
-//! ⟨τ, u − u_0⟩ = 0: the points with the numbers 8, 16, 32, …, the last one, and those on both sides of every event.
+//! ⟨τ, u − u_0⟩ = 0: the points with the numbers 8, 16, 32, 48, …, the last one, and those on both sides of every event.
 //! Newton's method needs two iterations for that, as a rule. Compared are the values of the test functions. Errors of
 //! single elements are no measure: near a homoclinic orbit, with all elements right to 10⁻⁶, dλ/ds may have the
 //! wrong sign.
@@ -35,8 +35,8 @@
 //! # Not guaranteed
 //! Two events of one kind between two neighbouring points of the branch are not seen, nor are collisions of
 //! multipliers on the unit circle away from ±1 (in conservative models). Branches that fork off are not followed. A
-//! closed branch is traced again and again until the largest number of points is reached. Points between those that
-//! are compared may be unresolved without a warning if the last point is resolved.
+//! closed branch is traced again and again until the largest number of points is reached. Fewer than sixteen
+//! points between two that are compared may be unresolved without a warning.
 //!
 //! # Reference
 //! H. B. Keller, *Numerical solution of bifurcation and nonlinear eigenvalue problems*, in: P. Rabinowitz (ed.), *Applications of
@@ -87,7 +87,7 @@ use tfe_runtime::{Element, Model, State};
 /// The elements have the same parts of the period along the whole branch. Where the period grows without bounds, as
 /// towards a homoclinic orbit, they no longer resolve how the parameter changes, and the branch of the elements may have
 /// folds, or go on, where that of the model does not. Every event is compared with elements of half the length
-/// ([`Event::resolved`]), and so are the points with the numbers 8, 16, 32, … and the last one: where these differ, there
+/// ([`Event::resolved`]), and so are the points with the numbers 8, 16, 32, 48, … and the last one: where these differ, there
 /// is a warning ([`Branch::warnings`]) with the index of the event or the point. The branch is followed nevertheless.
 ///
 /// ```

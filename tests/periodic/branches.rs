@@ -253,3 +253,38 @@ fn folds_are_confirmed_by_finer_elements() {
     assert_eq!(resolved(&response(0.0, 3.5)), folds);
     assert_eq!(resolved(&response(1e9, 3.5)), folds);
 }
+
+/// A hardening oscillator whose force is large in the middle of the branch only.
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2 - x^2/2 - x^4/4,
+    force(x) = (0.3 + f/(1 + ((s - 0.8)/0.02)^2))*cos(2*t) - 0.2*dot(x),
+    sensitivity(s),
+)]
+#[derive(Clone)]
+struct Peak {
+    f: f64,
+    s: f64,
+}
+
+/// Orbits in the middle of a branch that the elements do not resolve are told, although those at both ends are resolved.
+#[test]
+fn a_branch_that_is_not_resolved_in_the_middle_is_told() {
+    let peak = Peak { f: 100.0, s: 0.0 };
+    let branch = Continuation::of(&peak)
+        .parameter(|peak| &mut peak.s)
+        .range(0.0..1.2)
+        .elements(8)
+        .period(|_| TAU / 2.0)
+        .largest_step(0.03)
+        .run()
+        .expect("a branch");
+    let first = branch.warnings().iter().find_map(|warning| match warning {
+        BranchWarning::Unresolved { point, .. } => Some(*point),
+        _ => None,
+    });
+    let first = first.expect("a warning of a point");
+    let parameter = branch.points()[first].parameter;
+    assert!((parameter - 0.8).abs() < 0.1, "{parameter}");
+    assert!(first + 50 < branch.points().len(), "{first}");
+}
