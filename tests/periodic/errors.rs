@@ -1,7 +1,7 @@
 //! Invalid problems, and those without a solution, are typed errors.
 
 use crate::common::larger;
-use crate::models::{Duffing, FORCED, PENDULUM, Projectile, VanDerPol};
+use crate::models::{Duffing, FORCED, PENDULUM, Projectile, VanDerPol, response};
 use std::f64::consts::{PI, TAU};
 use tfe::boundary::{BoundaryError, Component};
 use tfe::periodic::{OrbitError, Phase};
@@ -516,4 +516,40 @@ fn branches_of_a_wrong_period_end() {
     );
     let told = error.to_string();
     assert!(told.contains("does not repeat after"), "{told}");
+}
+
+/// Elements that are too long close another motion: the orbit has a warning, which its summary shows.
+#[test]
+fn orbits_that_the_elements_do_not_resolve_are_told() {
+    let period = TAU / FORCED.omega;
+    let of = |periods: f64, elements: usize| {
+        let orbit = PeriodicOrbit::of(&FORCED).elements(elements);
+        let orbit = orbit.period(periods * period);
+        orbit.guess(response).solve().expect("an orbit")
+    };
+    let near = of(1.0, 40);
+    assert!(near.warnings().is_empty(), "{near}");
+    // Half a period in an element.
+    let many = of(20.0, 400);
+    assert!(many.warnings().is_empty(), "{many}");
+    assert!((many.start().q[0] - near.start().q[0]).abs() <= 1e-5);
+    let far = of(1000.0, 40);
+    let off = (far.start().q[0] - near.start().q[0]).abs();
+    assert!(off > 0.1 && far.warnings().len() == 1, "{off} {far}");
+    assert!(far.to_string().contains("40 elements do not resolve"));
+    // Unknown periods, with and without an unfolding force.
+    let cycle = VanDerPol::unit(5.0);
+    let coarse = PeriodicOrbit::of(&cycle).unknown_period(11.6).elements(400);
+    let fine = coarse.guess_from(cycle.state([2.0], [0.0])).solve();
+    let fine = fine.expect("an orbit");
+    assert!(fine.warnings().is_empty(), "{fine}");
+    let (start, found) = (PENDULUM.state([2.0], [0.0]), 8.349_752_926_918_493);
+    for elements in [3, 4, 40] {
+        let swing = PeriodicOrbit::of(&PENDULUM).unknown_period(8.0);
+        let swing = swing.elements(elements).energy(-(2.0_f64.cos()));
+        if let Ok(swing) = swing.guess_from(start).solve() {
+            let off = (swing.period() / found - 1.0).abs();
+            assert!(off <= 0.03 || !swing.warnings().is_empty(), "{off} {swing}");
+        }
+    }
 }
