@@ -302,3 +302,40 @@ fn a_hanging_ring_keeps_its_energy() {
     assert!(motion.energy_error() < 1e-7, "{:e}", motion.energy_error());
     assert!(motion.constraint_residual().position < 1e-13);
 }
+
+/// Rods of any unit of mass, length and time swing alike. In the units of molecules the inertias are far below the
+/// rounding errors of the constraints.
+#[test]
+fn light_chains_move_as_heavy_ones() {
+    #[dynamics(
+        coordinates(x[n], y[n]),
+        lagrangian = sum(i in 0..n, m/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
+        constraint(first) = x[0]^2 + y[0]^2 - l^2,
+        constraint(rod[i in 1..n]) = (x[i] - x[i-1])^2 + (y[i] - y[i-1])^2 - l^2,
+    )]
+    struct Hanging {
+        n: usize,
+        m: f64,
+        l: f64,
+        g: f64,
+    }
+    let end = |l: f64, m: f64, unit: f64| {
+        let g = l / (unit * unit);
+        let model = Hanging { n: 4, m, l, g };
+        let q = [0.6, 1.2, 1.8, 2.4, -0.8, -1.6, -2.4, -3.2].map(|q| q * l);
+        let simulation = Simulation::new(&model)
+            .element(Mixed::<5>)
+            .step(0.05 * unit);
+        let motion = simulation.run(model.state(q, [0.0; 8]), 0.0..3.0 * unit);
+        let end = motion.expect("a run").last().q.clone();
+        end.into_iter().map(|q| q / l).collect::<Vec<f64>>()
+    };
+    let wanted = end(1.0, 1.0, 1.0);
+    for (l, m, unit) in [(1e-10, 1e-27, 1e-14), (1e-6, 1e-15, 1.0), (1.0, 1e-18, 1.0)] {
+        let found = end(l, m, unit);
+        let off = found.iter().zip(&wanted).map(|(a, b)| (a - b).abs());
+        // Rounding errors of sixty steps.
+        let off = off.fold(0.0, larger);
+        assert!(off <= 1e-12, "{l:e} {m:e} {unit:e}: {off:.1e}");
+    }
+}

@@ -85,6 +85,8 @@ where
             system.sides[(row + 1) * columns - 1] = -residual;
         }
     }
+    form.constraints.weigh(system.tangent, size);
+    form.constraints.weigh(system.sides, columns);
     let sides = &*system.solve()?.sides;
     for a in 0..N {
         for (u, weight) in scheme.advance.iter().enumerate() {

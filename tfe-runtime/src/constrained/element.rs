@@ -51,6 +51,8 @@ pub(crate) struct ElementConstraints<'a, const N: usize> {
     pub(super) on_velocities: bool,
     /// Whether holonomic constraints act at the points.
     pub(super) on_positions: bool,
+    /// The factor of the rows of constraints in the system that is solved: see [`crate::lu::weight_of_rows`].
+    pub(super) weight: f64,
 }
 
 /// A point of the element.
@@ -113,6 +115,7 @@ impl<'a, const N: usize> ElementConstraints<'a, N> {
             impulse,
             on_velocities: false,
             on_positions: false,
+            weight: 1.0,
         };
         constraints.on_velocities = constraints.has(declared, false);
         constraints.on_positions = constraints.has(declared, true) && layout.degree() > 1;
@@ -286,6 +289,18 @@ impl<const N: usize> ElementConstraints<'_, N> {
         Increment { relative, ..inner }
     }
 
+    /// Multiplies the equations of the constraints, rows of so many columns, by their weight.
+    pub(super) fn weigh(&self, rows: &mut [f64], columns: usize) {
+        if self.weight == 1.0 {
+            return;
+        }
+        for row in self.layout.multipliers().flatten() {
+            for entry in &mut rows[row * columns..][..columns] {
+                *entry *= self.weight;
+            }
+        }
+    }
+
     /// The largest of the rates x of each coordinate, and of its velocity at the end.
     fn largest_rates(&self, x: &[f64]) -> [f64; N] {
         let mut sizes = by_coordinate(&x[..self.layout.rates()]);
@@ -403,7 +418,10 @@ where
     }
 
     fn residual(&mut self, x: &[f64], residual: &mut [f64]) -> Result<(), StepError> {
-        self.evaluate(x, residual, None)
+        self.evaluate(x, residual, None)?;
+        // With the weight of the tangent that is in use.
+        self.constraints.weigh(residual, 1);
+        Ok(())
     }
 
     fn tangent(
@@ -413,7 +431,11 @@ where
         tangent: &mut [f64],
     ) -> Result<(), StepError> {
         let by_start = &mut [];
-        self.evaluate(x, residual, Some(Derivatives { tangent, by_start }))
+        self.evaluate(x, residual, Some(Derivatives { tangent, by_start }))?;
+        self.constraints.weigh(residual, 1);
+        self.constraints
+            .weigh(tangent, self.constraints.layout.size());
+        Ok(())
     }
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {

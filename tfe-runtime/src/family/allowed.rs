@@ -34,7 +34,7 @@ impl Bordered {
     fn new(n: usize, rows: &Rows) -> Option<Self> {
         let borders = rows.places().flat_map(|(c, a)| [(n + c, a), (a, n + c)]);
         let places: Vec<(usize, usize)> = (0..n).map(|a| (a, a)).chain(borders).collect();
-        let matrix = Blocked::new(n + rows.phi.len(), 1, &places)?;
+        let matrix = Blocked::new(n + rows.phi.len(), 1, &places)?.bordered(n);
         let pair = |(c, a)| (matrix.place(n + c, a), matrix.place(a, n + c));
         Some(Self {
             diagonal: (0..n).map(|a| matrix.place(a, a)).collect(),

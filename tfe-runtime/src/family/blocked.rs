@@ -2,6 +2,7 @@
 //! factored on request.
 
 use crate::error::StepError;
+use crate::lu::{ratio, weight_of_rows};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
@@ -28,6 +29,10 @@ pub(super) struct Blocked {
     symbolic: SymbolicLu<usize>,
     pub(super) values: Vec<f64>,
     factors: Option<Lu<usize, f64>>,
+    /// The first of the rows of constraints.
+    border: usize,
+    /// Their factor in the matrix that is factored: see [`weight_of_rows`].
+    weight: f64,
 }
 
 impl fmt::Debug for Blocked {
@@ -72,7 +77,15 @@ impl Blocked {
             symbolic,
             values: vec![0.0; entries],
             factors: None,
+            border: count * block,
+            weight: 1.0,
         })
+    }
+
+    /// The same, whose blocks from this one on are constraints.
+    pub(super) fn bordered(mut self, first: usize) -> Self {
+        self.border = first * self.block;
+        self
     }
 
     /// The number of unknowns.
@@ -111,16 +124,55 @@ impl Blocked {
         if !self.values.iter().all(|value| value.is_finite()) {
             return Err(StepError::NonFinite);
         }
-        let matrix = SparseColMatRef::new(self.structure.as_ref(), &self.values);
+        self.weight = self.weight_of_border();
+        let weighted = (self.weight != 1.0).then(|| {
+            let rows = self.structure.row_idx().iter().zip(&self.values);
+            let weighted = rows.map(|(row, value)| self.weight_of(*row) * value);
+            weighted.collect::<Vec<f64>>()
+        });
+        let values = weighted.as_deref().unwrap_or(&self.values);
+        let matrix = SparseColMatRef::new(self.structure.as_ref(), values);
         let factors = Lu::try_new_with_symbolic(self.symbolic.clone(), matrix);
         self.factors = Some(factors.map_err(|_| StepError::SingularTangent { unknown: 0 })?);
         Ok(())
+    }
+
+    /// The weight of the rows of constraints beside the inertias in the same columns.
+    fn weight_of_border(&self) -> f64 {
+        let mut least = f64::INFINITY;
+        for column in 0..self.border {
+            let (mut inertia, mut entry) = (0.0_f64, 0.0_f64);
+            for at in self.structure.col_range(column) {
+                let size = self.values[at].abs();
+                if self.structure.row_idx()[at] < self.border {
+                    inertia = inertia.max(size);
+                } else {
+                    entry = entry.max(size);
+                }
+            }
+            least = least.min(ratio(inertia, entry));
+        }
+        weight_of_rows(least)
+    }
+
+    fn weight_of(&self, row: usize) -> f64 {
+        if row < self.border { 1.0 } else { self.weight }
+    }
+
+    /// Multiplies the entries of the constraints by their weight.
+    fn weigh(&self, vector: &mut [f64]) {
+        if self.weight != 1.0 {
+            for entry in &mut vector[self.border..] {
+                *entry *= self.weight;
+            }
+        }
     }
 
     /// Replaces a right-hand side by the solution; without factors it is unchanged. A numerically singular matrix gives
     /// a result that is not finite.
     pub(super) fn solve(&self, vector: &mut [f64]) {
         if let Some(factors) = &self.factors {
+            self.weigh(vector);
             factors.solve_in_place(faer::ColMut::from_slice_mut(vector).as_mat_mut());
         }
     }
@@ -129,6 +181,7 @@ impl Blocked {
     pub(super) fn solve_transposed(&self, vector: &mut [f64]) {
         if let Some(factors) = &self.factors {
             factors.solve_transpose_in_place(faer::ColMut::from_slice_mut(vector).as_mat_mut());
+            self.weigh(vector);
         }
     }
 }

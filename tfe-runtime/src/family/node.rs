@@ -47,7 +47,7 @@ impl Node {
         let masses = || pattern.places().iter().map(|(_, a, b)| (*a, *b));
         let borders = rows.places().flat_map(|(c, a)| [(n + c, a), (a, n + c)]);
         let places: Vec<(usize, usize)> = masses().chain(borders).collect();
-        let matrix = Blocked::new(n + m, 1, &places)?;
+        let matrix = Blocked::new(n + m, 1, &places)?.bordered(n);
         Some(Self {
             masses: masses().map(|(a, b)| matrix.place(a, b)).collect(),
             rows: rows

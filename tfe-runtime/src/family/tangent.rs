@@ -96,7 +96,7 @@ impl Parts {
         let borders = rows.places().flat_map(|(c, a)| [(n + c, a), (a, n + c)]);
         let places = entries.iter().map(|(_, _, row, column)| (*row, *column));
         let places: Vec<(usize, usize)> = places.chain(bent()).chain(borders).collect();
-        let matrix = Blocked::new(n + m, block, &places)?;
+        let matrix = Blocked::new(n + m, block, &places)?.bordered(n);
         let parts = entries
             .iter()
             .map(|(number, role, row, column)| (*number, *role, matrix.place(*row, *column)))
