@@ -304,13 +304,13 @@ fn a_hanging_ring_keeps_its_energy() {
 }
 
 /// Rods of any unit of mass, length and time swing alike. In the units of molecules the inertias are far below the
-/// rounding errors of the constraints.
+/// rounding errors of the constraints. The equation of the first rod is one site, and does not contain its index.
 #[test]
 fn light_chains_move_as_heavy_ones() {
     #[dynamics(
         coordinates(x[n], y[n]),
         lagrangian = sum(i in 0..n, m/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]),
-        constraint(first) = x[0]^2 + y[0]^2 - l^2,
+        constraint(first[i in 0..1]) = x[0]^2 + y[0]^2 - l^2,
         constraint(rod[i in 1..n]) = (x[i] - x[i-1])^2 + (y[i] - y[i-1])^2 - l^2,
     )]
     struct Hanging {

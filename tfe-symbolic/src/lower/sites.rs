@@ -188,8 +188,9 @@ impl Lowerer<'_> {
         let repetition = match (repeated, ranges.first()) {
             (Some(at), _) => Some((name.clone(), known.constraints[at].name.clone())),
             // All sites say the same.
-            (None, Some(SumRange { start, .. })) if self.graph.loops_of(row) == 0 => {
+            (None, Some(SumRange { start, end, .. })) if self.graph.loops_of(row) == 0 => {
                 let second = start.plus_scaled(&Affine::constant(1), 1);
+                let second = second.filter(|second| second != end);
                 second.map(|second| (format!("{own}[{second}]"), format!("{own}[{start}]")))
             }
             _ => None,
