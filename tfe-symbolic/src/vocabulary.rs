@@ -142,6 +142,28 @@ impl Argument {
         self.row().1
     }
 
+    /// How it is written.
+    pub fn form(self) -> &'static str {
+        match self {
+            Self::Coordinates => "coordinates(x, y)",
+            Self::Momenta => "momenta(px, py)",
+            Self::Input => "input(u)",
+            Self::Let => "let name = …",
+            Self::Lagrangian => "lagrangian = …",
+            Self::Hamiltonian => "hamiltonian = …",
+            Self::TimeTransformation => "time_transformation = …",
+            Self::Force => "force(x) = …",
+            Self::Dissipation => "dissipation = …",
+            Self::Constraint => "constraint(name) = …",
+            Self::Output => "output(name) = …",
+            Self::Event => "event(name) = …",
+            Self::Sensitivity => "sensitivity(m)",
+            Self::Solver => "solver(Name, Mixed::<4>)",
+            Self::Model => "model(Name, truncated(2))",
+            Self::Crate => "crate = ::tfe",
+        }
+    }
+
     /// Whether it may stand once only.
     pub fn stands_once(self) -> bool {
         self.row().2 == Times::Once

@@ -35,6 +35,8 @@ kinds! {
         wanted: String,
         /// What stands there.
         found: String,
+        /// How the argument is written, if the mistake follows its word.
+        form: Option<&'static str>,
     },
     /// An argument that follows another one without a comma, or behind a semicolon.
     MissingComma {

@@ -33,8 +33,8 @@ impl Kind {
                 format!("write `^` for a power, as in `{object}^2`")
             }
             Self::MethodCall { object, method } => match arity(method) {
-                2 => format!("write `{method}({object}, …)`"),
-                _ => format!("write `{method}({object})`"),
+                2 => format!("write `{method}({}, …)`", without_brackets(object)),
+                _ => format!("write `{method}({})`", without_brackets(object)),
             },
             Self::Path { path } => match path.rsplit("::").next() {
                 Some("PI") => "write `pi`".into(),
@@ -372,6 +372,9 @@ impl Kind {
             Self::Expected { found, .. } if found == "`\"`" => {
                 "write formulas without quotes, as in `lagrangian = m/2*dot(x)^2`".into()
             }
+            Self::Expected {
+                form: Some(form), ..
+            } => format!("write `{form}`"),
             Self::Expected { .. }
             | Self::NumberTooLarge { .. }
             | Self::ZeroLength { .. }
@@ -390,6 +393,13 @@ impl Kind {
             | Self::EmptyRange { .. } => return None,
         })
     }
+}
+
+/// A group without its brackets; anything else as it is.
+fn without_brackets(operand: &str) -> &str {
+    let inside = operand.strip_prefix('(');
+    let inside = inside.and_then(|inside| inside.strip_suffix(')'));
+    inside.unwrap_or(operand)
 }
 
 /// How many arguments a function has.

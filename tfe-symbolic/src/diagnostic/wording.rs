@@ -7,7 +7,7 @@ impl Kind {
     /// What is wrong: lower case, names in backticks, no full stop.
     pub fn message(&self) -> String {
         match self {
-            Self::Expected { wanted, found } => format!("expected {wanted}, found {found}"),
+            Self::Expected { wanted, found, .. } => format!("expected {wanted}, found {found}"),
             Self::MissingComma { found } => format!("expected a comma, found `{found}`"),
             Self::MissingOperator { left, right } => {
                 format!("missing operator between `{left}` and `{right}`")

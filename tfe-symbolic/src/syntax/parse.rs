@@ -27,7 +27,7 @@ use limits::within_limits;
 pub use limits::{MAX_NESTING, MAX_OPERATORS};
 pub(crate) use separators::missing_commas;
 pub use separators::split_arguments;
-use slips::slip;
+use slips::{slip, tidy};
 
 static PRATT: LazyLock<PrattParser<Rule>> = LazyLock::new(|| {
     PrattParser::new()
@@ -57,6 +57,7 @@ pub fn parse_item(text: &str, offset: usize, bag: &mut Bag) -> Option<Spanned<It
             Kind::Expected {
                 wanted,
                 found: found.words,
+                form: None,
             },
         );
         return None;
@@ -97,11 +98,13 @@ pub fn parse_item(text: &str, offset: usize, bag: &mut Bag) -> Option<Spanned<It
             };
             let found = found_at(text, at);
             let span = Span::new(offset + found.start, offset + found.end);
+            let follows_word = text[..found.start].trim() == word;
             bag.push(
                 span,
                 Kind::Expected {
                     wanted,
                     found: found.words,
+                    form: follows_word.then(|| argument.form()),
                 },
             );
             None
@@ -405,7 +408,7 @@ impl Builder<'_> {
                 let number = left.trim_end_matches('_').to_owned();
                 self.bag.push(span, Kind::NumberWithType { number });
             } else {
-                let (left, right) = (left.to_owned(), right.to_owned());
+                let (left, right) = (tidy(left), tidy(right));
                 self.bag.push(span, Kind::MissingOperator { left, right });
             }
         }

@@ -2,8 +2,8 @@
 
 use std::ops::Range as Bytes;
 
-use crate::diagnostic::Kind;
-use crate::vocabulary::is_function;
+use crate::diagnostic::{Kind, nearest};
+use crate::vocabulary::{PASSES, is_function};
 
 /// The habit behind a syntax error at a place of the text of an argument, and what to underline.
 pub(super) fn slip(argument: &str, text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
@@ -13,8 +13,40 @@ pub(super) fn slip(argument: &str, text: &str, at: usize) -> Option<(Bytes<usize
         '.' => point(text, at),
         ':' if !matches!(argument, "solver" | "crate") => path(text, at),
         '|' => Some((at..at + 1, Kind::Bars)),
+        ',' | ')' if argument == "model" => bare_pass(text, at),
         _ => None,
     })
+}
+
+/// `model(Linear, linearised)`: a word that is no pass, without the parentheses of one.
+fn bare_pass(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
+    let word = words(&text[..at]).last()?;
+    let before = text[..word.start].trim_end();
+    let name = &text[word.clone()];
+    if !before.ends_with(',') || !text[word.end..at].trim().is_empty() || PASSES.contains(&name) {
+        return None;
+    }
+    let kind = Kind::UnknownPass {
+        name: name.to_owned(),
+        nearest: nearest(name, PASSES.iter().copied()),
+    };
+    Some((word, kind))
+}
+
+/// The text of tokens without the blanks inside brackets, between a name and its brackets, and before commas.
+pub(super) fn tidy(text: &str) -> String {
+    let mut tidy = String::new();
+    for letter in text.chars() {
+        let end = tidy.trim_end().len();
+        let follows_name = tidy[..end].ends_with(|last: char| last.is_alphanumeric());
+        if matches!(letter, ')' | ']' | ',') || (matches!(letter, '(' | '[') && follows_name) {
+            tidy.truncate(end);
+        }
+        if !(letter.is_whitespace() && tidy.ends_with(['(', '['])) {
+            tidy.push(letter);
+        }
+    }
+    tidy
 }
 
 /// `if a < b { x } else { y }`: the grammar reads `if` as a name and stops further on.
@@ -52,19 +84,17 @@ fn equals_sign(argument: &str, text: &str, at: usize) -> Option<(Bytes<usize>, K
     Some((at..at + 1, Kind::EqualsSign { left, right }))
 }
 
-/// `link.m`, `x.sin()`
+/// `link.m`, `x.sin()`, `dot(x).powi(2)`
 fn point(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
-    let object = words(&text[..at]).last()?;
-    if !text[object.end..at].trim().is_empty() {
-        return None;
-    }
+    let object = operand_before(text, at)?;
+    let is_word = is_name(&text[object.clone()]);
     let blanks = text[at + 1..].len() - text[at + 1..].trim_start().len();
     let start = at + 1 + blanks;
     let field = words(&text[start..])
         .next()
         .filter(|word| word.start == 0)?;
     let end = start + field.end;
-    let (name, field) = (text[object.clone()].to_owned(), text[start..end].to_owned());
+    let (name, field) = (tidy(&text[object.clone()]), text[start..end].to_owned());
     let called = text[end..].trim_start().starts_with('(');
     let is_method = is_function(&field) || matches!(field.as_str(), "powi" | "powf");
     let kind = if called && is_method {
@@ -72,6 +102,8 @@ fn point(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
             object: name,
             method: field,
         }
+    } else if !is_word {
+        return None;
     } else {
         Kind::FieldAccess {
             object: name,
@@ -79,6 +111,36 @@ fn point(text: &str, at: usize) -> Option<(Bytes<usize>, Kind)> {
         }
     };
     Some((object.start..end, kind))
+}
+
+/// The name, call, element or group that ends at a place, except for blanks.
+fn operand_before(text: &str, at: usize) -> Option<Bytes<usize>> {
+    let end = text[..at].trim_end().len();
+    let mut start = end;
+    if text[..end].ends_with([')', ']']) {
+        let mut depth = 0i64;
+        let opening = text[..end].char_indices().rev().find(|(_, letter)| {
+            match letter {
+                ')' | ']' => depth += 1,
+                '(' | '[' => depth -= 1,
+                _ => {}
+            }
+            depth == 0
+        });
+        start = opening?.0;
+    }
+    let before = text[..start].trim_end().len();
+    match words(&text[..before]).last() {
+        Some(word) if word.end == before => Some(word.start..end),
+        _ if start < end => Some(start..end),
+        _ => None,
+    }
+}
+
+fn is_name(text: &str) -> bool {
+    words(text)
+        .next()
+        .is_some_and(|word| word == (0..text.len()))
 }
 
 /// `std::f64::consts::PI`
@@ -159,6 +221,18 @@ mod tests {
         check("output(a) = x§.sin()", "x.sin", "MethodCall");
         check("output(a) = x§.powi(2)", "x.powi", "MethodCall");
         check("output(a) = x§.powi", "x.powi", "FieldAccess");
+        check(
+            "output(a) = 2*dot( x )§.powi(2)",
+            "dot( x ).powi",
+            "MethodCall",
+        );
+        check("output(a) = q[0]§.sin()", "q[0].sin", "MethodCall");
+        check(
+            "output(a) = 2*(x + (y))§.sqrt()",
+            "(x + (y)).sqrt",
+            "MethodCall",
+        );
+        check("model(Linear, linearised§)", "linearised", "UnknownPass");
         check("output(a) = §|x| x^2", "|", "Bars");
         check(
             "output(a) = 2*std §:: f64::consts::PI*t",
@@ -169,10 +243,18 @@ mod tests {
     }
 
     #[test]
+    fn texts_of_tokens_are_tidied() {
+        assert_eq!(tidy("( x + q [ i ] , 1 )"), "(x + q[i], 1)");
+        assert_eq!(tidy("2 * (dot ( x ) + 1)"), "2 * (dot(x) + 1)");
+    }
+
+    #[test]
     fn other_places_are_left_to_the_grammar() {
         for text in [
             "output(a) = x + §)",
             "output(a) = 2 §.5",
+            "output(a) = (x + y)§.x",
+            "model(Linear, truncated§)",
             "let a§: f64 = 2",
             "§= 3",
             "constraint(a) = select(x §== y, 1, 2)",
