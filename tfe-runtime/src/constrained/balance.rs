@@ -214,7 +214,8 @@ fn commensurate<const N: usize>(inertia: &[[f64; N]; N], rows: &[[f64; N]]) -> f
             least = least.min(ratio(inertia[a][a], row[a]));
         }
     }
-    weight_of_rows(least)
+    // Columns of rates are eliminated before those of multipliers.
+    weight_of_rows(least).min(1.0)
 }
 
 /// Σ rows_c μ_c
