@@ -10,7 +10,7 @@ use crate::length::{Declared, FixedLength, Length};
 use crate::motion::{Node, default_step};
 use crate::progress::Progress;
 use crate::simulation::mesh::Mesh;
-use crate::simulation::times::looks_at_ends;
+use crate::simulation::times::AtEnds;
 use crate::simulation::{Watching, check_breaks, check_tolerance};
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -310,8 +310,8 @@ where
     ) -> Result<Statistics, EnsembleError> {
         let count = self.models.count(starts.len())?;
         let step = self.step_over(&span);
-        let at_ends = looks_at_ends(self.element, !M::CONSTRAINTS.is_empty());
-        let mesh = Mesh::new(&span, step, &self.breaks, &[])?.whole_unless(at_ends);
+        let at_ends = AtEnds::of(self.element, !M::CONSTRAINTS.is_empty());
+        let mesh = Mesh::new(&span, step, &self.breaks, &[])?.with(at_ends);
         self.check_method()?;
         let plan = Plan {
             element: self.element,

@@ -11,7 +11,7 @@ use super::setup::Ensemble;
 use crate::length::{Declared, FixedLength, Length, RunTimeLength};
 use crate::progress::Progress;
 use crate::simulation::mesh::Mesh;
-use crate::simulation::times::looks_at_ends;
+use crate::simulation::times::AtEnds;
 use crate::simulation::{Reached, Simulated};
 use std::fmt;
 use std::sync::Mutex;
@@ -241,8 +241,8 @@ where
         let chosen = (reached.step).or_else(|| (length > 0.0).then_some(length / 1000.0));
         let step = chosen.unwrap_or(0.0);
         let (mesh, done, origin) = reached.place(end, None, &|span, _| {
-            let at_ends = looks_at_ends(ensemble.element, M::IS_CONSTRAINED);
-            Ok(Mesh::new(span, step, &ensemble.breaks, &[])?.whole_unless(at_ends))
+            let at_ends = AtEnds::of(ensemble.element, M::IS_CONSTRAINED);
+            Ok(Mesh::new(span, step, &ensemble.breaks, &[])?.with(at_ends))
         })?;
         let next = Reached::new((origin, reached.direction), chosen, &mesh, end);
         let plan = Plan {

@@ -151,7 +151,7 @@ where
                     breaks: &self.breaks,
                     impulses: &impulses,
                 };
-                Ok(M::mesh(span, &grid)?.whole_unless(self.looks_at_ends()))
+                Ok(M::mesh(span, &grid)?.with(self.at_ends()))
             };
             let nodes = self.nodes.as_deref();
             let place = checkpoint.reached.place(end, nodes, &mesh)?;

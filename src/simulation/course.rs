@@ -21,7 +21,7 @@ struct Legs {
 /// One element of the sequence.
 pub(super) struct Leg {
     pub(super) number: usize,
-    /// The start, to the full digits of the step; the nodes may be rounded.
+    /// The start from which the times of points are counted.
     pub(super) begin: f64,
     /// The length.
     pub(super) h: f64,

@@ -11,7 +11,7 @@ use tfe_runtime::transition::TransitionError;
 /// An element that a run has passed.
 pub struct Passed<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) start: f64,
-    /// The time at which the force is first evaluated: the start, or a few ulps after it if the start is a break.
+    /// The start from which the times of points are counted: a few ulps beside it if a break is at an end.
     pub(super) begin: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,

@@ -1,6 +1,6 @@
 //! The mesh of a run: its elements and the impulses that act in them.
 
-use super::times::{Elements, Times, check_span};
+use super::times::{AtEnds, Elements, Times, check_span};
 use crate::error::RunErrorKind;
 use crate::motion::{default_step, direction_of};
 use std::ops::Range;
@@ -78,10 +78,10 @@ impl<const N: usize> Mesh<N> {
         })
     }
 
-    /// The same elements, whole if nothing looks at their ends; see [`looks_at_ends`](super::times::looks_at_ends).
-    pub(crate) fn whole_unless(self, at_ends: bool) -> Self {
+    /// The same elements for what is evaluated at their ends; see [`Times::with`].
+    pub(crate) fn with(self, at_ends: AtEnds) -> Self {
         Self {
-            times: self.times.whole_unless(at_ends),
+            times: self.times.with(at_ends),
             ..self
         }
     }
@@ -116,7 +116,7 @@ impl<const N: usize> Mesh<N> {
         self.times.elements()
     }
 
-    /// The time at which the force is first evaluated in an element; see [`Times::begin`].
+    /// The time from which those of the points of an element are counted; see [`Times::begin`].
     pub(crate) fn begin(&self, t: f64, h: f64) -> f64 {
         self.times.begin(t, h)
     }

@@ -22,7 +22,7 @@ pub(super) struct Planned<'a, const N: usize> {
     pub(super) t: f64,
     pub(super) next: f64,
     pub(super) h: f64,
-    /// The start, to the full digits of the step.
+    /// The start from which the times of points are counted.
     pub(super) begin: f64,
     pub(super) impulses: &'a [Impulse<N>],
 }
@@ -59,6 +59,8 @@ pub(super) fn planned<const N: usize>(
 /// A piece that was solved and not cut by an event.
 pub(super) struct Piece<'a, const N: usize, L: Length<N> = FixedLength> {
     pub(super) start: f64,
+    /// The start from which the times of points are counted.
+    pub(super) begin: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,
     pub(super) after: &'a L::State,
@@ -319,6 +321,7 @@ where
             stepper,
             &Piece {
                 start: t,
+                begin,
                 h,
                 before,
                 after,

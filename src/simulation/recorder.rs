@@ -240,6 +240,7 @@ where
         if !piece.has_impulses {
             let examined = Examined {
                 t: piece.start,
+                begin: piece.begin,
                 h: piece.h,
                 before: piece.before,
                 after: piece.after,

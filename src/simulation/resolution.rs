@@ -81,6 +81,8 @@ pub struct Again<'m, M: 'm> {
 /// An element that the run has solved.
 pub struct Examined<'a, const N: usize, L: Length<N>> {
     pub(super) t: f64,
+    /// The start from which the times of points are counted.
+    pub(super) begin: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,
     pub(super) after: &'a L::State,
@@ -288,8 +290,10 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
         examined: &Examined<'_, N, L>,
         advance: &mut Advance<'_, L::State>,
     ) -> Option<L::State> {
-        let Examined { t, h, after, .. } = *examined;
-        let end = self.end_of_parts((t, h), parts, start, advance);
+        let Examined {
+            t, begin, h, after, ..
+        } = *examined;
+        let end = self.end_of_parts((begin, h), parts, start, advance);
         let reached = end.as_ref().map(halves::<N, L>);
         let off = off(reached, halves::<N, L>(after));
         self.found.compared.push(Compared { t, h, off });

@@ -10,7 +10,7 @@ use super::progress;
 use super::recorder::Recorder;
 use super::setup::Simulation;
 use super::steps::{Beginning, Steps};
-use super::times::{Endless, looks_at_ends};
+use super::times::{AtEnds, Endless};
 use crate::error::{RunError, RunErrorKind};
 use crate::length::Length;
 use crate::motion::{Motion, Reached, Seen};
@@ -234,12 +234,12 @@ where
     }
 
     pub(super) fn mesh(&self, span: &Range<f64>) -> Result<Mesh<N>, RunErrorKind> {
-        Ok(M::mesh(span, &self.grid())?.whole_unless(self.looks_at_ends()))
+        Ok(M::mesh(span, &self.grid())?.with(self.at_ends()))
     }
 
-    /// See [`looks_at_ends`].
-    pub(super) fn looks_at_ends(&self) -> bool {
-        looks_at_ends(self.chosen_element(), M::IS_CONSTRAINED)
+    /// See [`AtEnds`].
+    pub(super) fn at_ends(&self) -> AtEnds {
+        AtEnds::of(self.chosen_element(), M::IS_CONSTRAINED)
     }
 
     /// An iterator over the nodes that follow `start`, one for each [step](Self::step), without end and in constant
@@ -292,7 +292,7 @@ where
                 end: f64::INFINITY,
             });
         }
-        let elements = Endless::new(t0, step, &self.breaks)?.whole_unless(self.looks_at_ends());
+        let elements = Endless::new(t0, step, &self.breaks)?.with(self.at_ends());
         let mut stepper = M::stepper(self.model.clone(), self.chosen())?;
         M::check_velocity(&mut stepper, (t0, start))?;
         if self.events.is_empty() {

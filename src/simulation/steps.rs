@@ -272,6 +272,7 @@ where
         if !has_impulses {
             let examined = Examined {
                 t,
+                begin: leg.begin,
                 h: leg.h,
                 before: &before,
                 after: state,
@@ -434,6 +435,7 @@ where
         if !piece.has_impulses {
             let examined = Examined {
                 t: piece.start,
+                begin: piece.begin,
                 h: piece.h,
                 before: piece.before,
                 after: piece.after,

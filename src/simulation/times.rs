@@ -20,6 +20,52 @@ struct Segment {
     whole: bool,
     /// Whether the interval begins and ends at a break.
     at_break: (bool, bool),
+    at_ends: AtEnds,
+}
+
+/// What an element evaluates at its ends, where a break may be.
+///
+/// There it must see what is on one side of the break. Its length is not changed for that, because the time that is left
+/// out at each of many breaks would add up: all its times are moved by a few ulps instead.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum AtEnds {
+    /// Nothing.
+    Nothing,
+    /// Forces at the end, not at the start (Radau).
+    LastPoint,
+    /// Forces (Lobatto) or constraints at both ends.
+    Both,
+}
+
+impl AtEnds {
+    /// What this element evaluates at its ends.
+    pub(crate) fn of(element: Element, is_constrained: bool) -> Self {
+        match (element.rule(), element.family()) {
+            (Rule::Lobatto(_), _) => Self::Both,
+            _ if is_constrained => Self::Both,
+            (_, Family::Radau) => Self::LastPoint,
+            _ => Self::Nothing,
+        }
+    }
+
+    /// How far the times at which an element from `start` to `end` is evaluated are moved, if it begins or ends at a
+    /// break.
+    fn shift(self, at_break: (bool, bool), (start, end): (f64, f64)) -> f64 {
+        let few = beside(start, end);
+        match (self, at_break) {
+            (Self::Nothing, _) | (_, (false, false)) => 0.0,
+            (Self::LastPoint, _) | (Self::Both, (false, true)) => -few,
+            (Self::Both, (true, _)) => few,
+        }
+    }
+
+    /// The time that an element from `start` to `end` leaves out: no shift keeps both ends between two breaks.
+    fn left_out(self, at_break: (bool, bool), (start, end): (f64, f64)) -> f64 {
+        match (self, at_break) {
+            (Self::Both, (true, true)) => 2.0 * beside(start, end),
+            _ => 0.0,
+        }
+    }
 }
 
 /// Refuses an invalid span, and a step that cannot divide it.
@@ -143,12 +189,12 @@ impl Times {
         })
     }
 
-    /// The same elements, whole if nothing looks at their ends; see [`looks_at_ends`].
-    pub(super) fn whole_unless(mut self, at_ends: bool) -> Self {
-        if !at_ends {
-            self.segments.iter_mut().for_each(Segment::forget_breaks);
-            self.has_breaks = false;
+    /// The same elements for what is evaluated at their ends; without this call, nothing.
+    pub(super) fn with(mut self, at_ends: AtEnds) -> Self {
+        for segment in &mut self.segments {
+            segment.at_ends = at_ends;
         }
+        self.has_breaks &= at_ends != AtEnds::Nothing;
         self
     }
 
@@ -178,24 +224,26 @@ impl Times {
         }
     }
 
-    /// The time at which the force is first evaluated in the element that begins at `t` and has the length `h`: `t`, or
-    /// a few ulps later if `t` is a break, so that an element with a point at its start sees the force after the break.
+    /// The time from which the times of the points of the element from `t` to `t + h` are counted: `t`, or a few ulps
+    /// before or after it if a break is at an end of the element at which something is evaluated.
     #[inline]
     pub(super) fn begin(&self, t: f64, h: f64) -> f64 {
         if self.has_breaks {
-            self.behind_break(t, h)
+            self.beside_breaks(t, h)
         } else {
             t
         }
     }
 
-    fn behind_break(&self, t: f64, h: f64) -> f64 {
-        let is_before = |segment: &Segment| self.direction * segment.start < self.direction * t;
-        let segment = self.segments.get(self.segments.partition_point(is_before));
-        match segment {
-            Some(segment) if segment.start == t && segment.at_break.0 => t + rounding(t, h),
-            _ => t,
-        }
+    fn beside_breaks(&self, t: f64, h: f64) -> f64 {
+        let is_behind = |segment: &Segment| self.direction * segment.start <= self.direction * t;
+        let behind = self.segments.partition_point(is_behind);
+        let Some(segment) = behind.checked_sub(1).and_then(|k| self.segments.get(k)) else {
+            return t;
+        };
+        let at_start = segment.at_break.0 && segment.start == t;
+        let at_end = segment.at_break.1 && is_same_time(t + h, segment.end);
+        t + segment.at_ends.shift((at_start, at_end), (t, t + h))
     }
 }
 
@@ -273,6 +321,7 @@ impl Endless {
             steps: usize::MAX,
             whole: true,
             at_break: (breaks.iter().any(|one| is_same_time(*one, last)), false),
+            at_ends: AtEnds::Nothing,
         });
         Ok(Self {
             segments,
@@ -281,25 +330,21 @@ impl Endless {
         })
     }
 
-    /// The same elements, whole if nothing looks at their ends; see [`looks_at_ends`].
-    pub(crate) fn whole_unless(mut self, at_ends: bool) -> Self {
-        if !at_ends {
-            self.segments.iter_mut().for_each(Segment::forget_breaks);
+    /// The same elements for what is evaluated at their ends; see [`Times::with`].
+    pub(crate) fn with(mut self, at_ends: AtEnds) -> Self {
+        for segment in &mut self.segments {
+            segment.at_ends = at_ends;
         }
         self
     }
 
-    /// Start, end and length of the next element, and the time at which the force is first evaluated in it.
+    /// Start, end and length of the next element, and the time from which those of its points are counted; see
+    /// [`Times::begin`].
     pub(crate) fn element(&self) -> (f64, f64, f64, f64) {
         let (segment, k) = (&self.segments[self.segment], self.done);
         let (t, next, h) = (segment.node(k), segment.node(k + 1), segment.length(k));
-        let is_after_break = segment.at_break.0 && k == 0;
-        let begin = if is_after_break {
-            t + rounding(t, h)
-        } else {
-            t
-        };
-        (t, next, h, begin)
+        let shift = segment.at_ends.shift(segment.breaks_of(k), (t, t + h));
+        (t, next, h, t + shift)
     }
 
     pub(crate) fn advance(&mut self) {
@@ -310,15 +355,6 @@ impl Endless {
     }
 }
 
-/// Whether forces or constraints are evaluated at the ends of an element, where a break may be. There, such an element
-/// is shortened by a few ulps of the time, so that it sees what is on its own side. Others keep their length: the time
-/// that is left out at each of many breaks would add up.
-pub(crate) fn looks_at_ends(element: Element, is_constrained: bool) -> bool {
-    let has_points_there =
-        matches!(element.family(), Family::Radau) || matches!(element.rule(), Rule::Lobatto(_));
-    has_points_there || is_constrained
-}
-
 /// The first and the last of at least two times.
 fn ends(times: &[f64]) -> (f64, f64) {
     match times {
@@ -327,10 +363,10 @@ fn ends(times: &[f64]) -> (f64, f64) {
     }
 }
 
-/// The length of an element that ends at a break: a few ulps shorter, so that an element with a point at its end sees
+/// The length of a trial step that ends at a break: a few ulps shorter, so that an element with a point at its end sees
 /// the force before the break.
 pub(crate) fn up_to_break(start: f64, end: f64) -> f64 {
-    (end - start) - rounding(end, end - start)
+    (end - start) - beside(start, end)
 }
 
 /// Whether a time is one of a list in the order of the run, up to rounding.
@@ -340,9 +376,9 @@ fn is_among(times: &[f64], time: f64, direction: f64) -> bool {
     near.iter().any(|one| is_same_time(*one, time))
 }
 
-/// A few ulps of the time, in the direction of the run.
-fn rounding(t: f64, h: f64) -> f64 {
-    h.signum() * 4.0 * f64::EPSILON * t.abs().max(h.abs())
+/// A few ulps of the times of an element, in the direction of the run.
+fn beside(start: f64, end: f64) -> f64 {
+    (end - start).signum() * 4.0 * f64::EPSILON * start.abs().max(end.abs())
 }
 
 /// Refuses nodes that do not form a run over the span.
@@ -396,6 +432,7 @@ fn single_steps(nodes: &[f64]) -> Vec<Segment> {
             steps: 1,
             whole: true,
             at_break: (false, false),
+            at_ends: AtEnds::Nothing,
         }));
         from += count;
     }
@@ -427,6 +464,7 @@ impl Segment {
             steps: steps as usize,
             whole,
             at_break: (false, false),
+            at_ends: AtEnds::Nothing,
         };
         segment.check_resolution()?;
         Ok(segment)
@@ -436,23 +474,22 @@ impl Segment {
         check_resolution(self.start.abs().max(self.end.abs()), self.step)
     }
 
-    /// Makes elements as long as the time between their nodes.
-    fn forget_breaks(&mut self) {
-        self.at_break = (false, false);
+    /// Whether the k-th element begins and ends at a break.
+    fn breaks_of(&self, k: usize) -> (bool, bool) {
+        let (at_start, at_end) = self.at_break;
+        (at_start && k == 0, at_end && k + 1 == self.steps)
     }
 
     /// The length of the k-th element.
     fn length(&self, k: usize) -> f64 {
-        let mut length = if self.whole || k + 1 < self.steps {
+        let length = if self.whole || k + 1 < self.steps {
             self.step
         } else {
             self.end - self.node(k)
         };
-        if self.at_break.0 && k == 0 {
-            length -= rounding(self.start, length);
-        }
-        if self.at_break.1 && k + 1 == self.steps {
-            length -= rounding(self.end, length);
+        if self.at_ends == AtEnds::Both {
+            let ends = (self.node(k), self.node(k + 1));
+            return length - self.at_ends.left_out(self.breaks_of(k), ends);
         }
         length
     }

@@ -3,6 +3,7 @@
 mod failures;
 mod loops;
 mod rates;
+mod whole;
 
 use tfe::prelude::*;
 use tfe::{AtError, Driven};

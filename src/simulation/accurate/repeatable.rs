@@ -3,7 +3,7 @@
 
 use crate::accuracy::Trace;
 use crate::error::RunErrorKind;
-use crate::simulation::times::{Times, looks_at_ends};
+use crate::simulation::times::{AtEnds, Times};
 use std::ops::ControlFlow;
 use tfe_runtime::constrained::Trail;
 use tfe_runtime::step::Control;
@@ -51,7 +51,7 @@ impl Given<'_> {
     }
 
     fn for_element(&self, element: Element, times: Times) -> Times {
-        times.whole_unless(looks_at_ends(element, self.is_constrained))
+        times.with(AtEnds::of(element, self.is_constrained))
     }
 
     /// A trace without rows.

@@ -253,7 +253,7 @@ fn pass<'m, const N: usize, L: Length<N>>(
         let piece = Planned {
             t: from,
             h: length,
-            begin: if from == t { planned.begin } else { from },
+            begin: from + (planned.begin - t),
             impulses: &planned.impulses[acted..],
             ..planned
         };
