@@ -9,10 +9,11 @@
 //!
 //! In a product with a choice between a value and zero, factors that may be infinite are moved into the choice. Norms
 //! are treated in `norms.rs`, exponents in `exponents.rs`, exponentials in `exponentials.rs`, inverse functions in `inverse.rs`, sums whose terms have a
-//! limit only together in `together.rs`, and products of signs and choices that jump at the same place in `sides.rs`. This is done to the entries as a last step, after factors have been combined, so
+//! limit only together in `together.rs`, and products and sums of signs and choices that jump at the same place in `sides.rs`. This is done to the entries as a last step, after factors have been combined, so
 //! that m/√m is √m and no choice is needed. Energies and outputs have the limits of norms and of quotients of exponentials
 //! only.
 
+mod approach;
 mod exponentials;
 mod exponents;
 mod facts;

@@ -129,6 +129,55 @@ fn kinks_that_meet() {
     check("abs(x^2 - 1)*abs(x^4 - 1)", &[], 2.0, &[45.0, 156.0, 430.0]);
 }
 
+/// Sums of jumps at the same place: stops without a gap, and functions that are written by pieces. Each term has the value of one of its
+/// sides there, and not all of them of the same.
+#[test]
+fn sums_of_kinks_that_meet() {
+    for (energy, expected) in [
+        ("max(x, 0) + min(x, 0)", [0.0, 1.0, 0.0]),
+        ("max(x, 0) - max(-x, 0)", [0.0, 1.0, 0.0]),
+        ("abs(x) - 2*max(x, 0)", [0.0, -1.0, 0.0]),
+        ("max(x, 0)^2 + min(x, 0)^2", [0.0, 0.0, 2.0]),
+        ("3*max(x, 0)^2 + 3*max(-x, 0)^2", [0.0, 0.0, 6.0]),
+        (
+            "select(x > 0, x^2, 0) + select(x < 0, x^2, 0)",
+            [0.0, 0.0, 2.0],
+        ),
+    ] {
+        check(energy, &[], 0.0, &expected);
+    }
+    // With and without a gap.
+    let stops = "3*max(x - a, 0)^2 + 3*max(b - x, 0)^2";
+    let closed = [("a", 2.0), ("b", 2.0)];
+    check(stops, &closed, 2.0, &[0.0, 0.0, 6.0]);
+    check(stops, &closed, 3.0, &[3.0, 6.0, 6.0]);
+    let open = [("a", 2.0), ("b", 1.0)];
+    check(stops, &open, 1.5, &[0.0, 0.0, 0.0]);
+    check(stops, &open, 3.0, &[3.0, 6.0, 6.0]);
+    let play = "3*max(abs(x) - a, 0)^2";
+    check(play, &[("a", 0.0)], 0.0, &[0.0, 0.0, 6.0]);
+    check(play, &[("a", 1.0)], 0.0, &[0.0, 0.0, 0.0]);
+    check(play, &[("a", 1.0)], -2.0, &[3.0, -6.0, 6.0]);
+}
+
+/// Stops between two bodies, of which the quantities that vanish are multiples of each other; and two kinks of different directions,
+/// which have no limit together.
+#[test]
+fn sums_of_kinks_of_several_coordinates() {
+    let of = |energy: &str, q: [f64; 2]| {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
+        let parameters = [("a", 1.0), ("b", -1.0)];
+        let found = results_of(&text, &parameters, ALL, &q, &[0.0; 2]);
+        (found.q, found.qq.concat())
+    };
+    let stops = "(3*max(x - y - a, 0)^2 + 3*max(2*y - 2*x - 2*b, 0)^2/4)";
+    let stiffness = vec![-6.0, 6.0, 6.0, -6.0];
+    assert_eq!(of(stops, [2.0, 1.0]), (vec![0.0; 2], stiffness.clone()));
+    assert_eq!(of(stops, [4.0, 1.0]), (vec![-12.0, 12.0], stiffness));
+    let crossing = "(max(x - a, 0)^2 + max(-x - b, 0)^2 + max(y - a, 0)^2)";
+    assert_eq!(of(crossing, [1.0; 2]).1, [-2.0, 0.0, 0.0, -2.0]);
+}
+
 /// Where both sides differ nothing is changed: the sign of zero is zero, and of equal arguments `max` takes the first.
 #[test]
 fn jumps_of_the_curvature_stay() {

@@ -8,7 +8,11 @@
 //! product is there not what it is on both sides. The terms that jump are evaluated for a quantity u → 0 from above and from
 //! below, where sign u is 1 and −1, and sign w(u) the sign of u ∂w/∂u. Where both are the same expression, and not what the terms
 //! are at u = 0, that is the limit. Where they differ, as 2 sign x of x |x| + |x| |sin x| does, the terms are unchanged.
+//!
+//! The same is done for sums of a few terms that jump: of max(x − a, 0)² + max(b − x, 0)² both terms have the curvature 2 at x = a = b,
+//! where the sum is (x − a)².
 
+use super::approach::Approach;
 use super::facts::{factors_of, is_at_rest, is_zero, moves, times_terms};
 use super::norm::{MAX_DEPTH, MAX_SUMS, is_small_with_its_argument};
 use crate::derive::entry::Entry;
@@ -19,10 +23,12 @@ use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
 use crate::expr::input::{Affine, Input};
-use crate::expr::rewrite::Mapping;
 
 /// In a sum no more quantities than these are examined.
 const MAX_KINKS: usize = 6;
+
+/// Of longer sums only the products of jumps are examined.
+const MAX_JUMPING: usize = 8;
 
 /// Differences of the two sides are multiplied out to at most this number of terms.
 const MAX_TERMS: usize = 64;
@@ -65,8 +71,7 @@ impl Sides {
 
     fn new_limit(&mut self, graph: &mut Graph, x: ExprId) -> Option<ExprId> {
         let (_, terms) = graph.terms(x);
-        let mut times = terms.iter().map(|(_, term)| jumps(graph, *term, MAX_SUMS));
-        if graph.contains_sum(x) || !times.any(|times| times > 1) {
+        if graph.contains_sum(x) || !jump_together(graph, &terms) {
             return None;
         }
         let trial = self.trial.get_or_insert_with(|| graph.clone());
@@ -160,6 +165,16 @@ fn multiplied_out(graph: &mut Graph, term: ExprId) -> Option<Vec<Term>> {
     Some(products)
 }
 
+/// Whether there are products of jumps among the terms, or a few terms that jump.
+fn jump_together(graph: &Graph, terms: &[Term]) -> bool {
+    let times = terms
+        .iter()
+        .map(|(_, term)| jumps(graph, *term, MAX_SUMS))
+        .filter(|times| *times > 0);
+    let times: Vec<usize> = times.collect();
+    times.iter().any(|times| *times > 1) || (2..=MAX_JUMPING).contains(&times.len())
+}
+
 /// The number of jumps that are multiplied with each other in a term.
 fn jumps(graph: &Graph, term: ExprId, depth: usize) -> usize {
     let mut count = 0_usize;
@@ -170,11 +185,28 @@ fn jumps(graph: &Graph, term: ExprId, depth: usize) -> usize {
                 let within = terms.iter().map(|(_, z)| jumps(graph, *z, depth));
                 within.max().unwrap_or(0).saturating_mul(times)
             }
-            _ => usize::from(times > 0 && is_jump(graph.node(y))),
+            (_, depth) if times > 0 && is_jump(graph.node(y)) => {
+                1 + jumps_in_branches(graph, y, depth)
+            }
+            _ => 0,
         };
         count = count.saturating_add(own);
     }
     count
+}
+
+/// The number of jumps in the branches of a choice, as of the slope of max(|x| − a, 0).
+fn jumps_in_branches(graph: &Graph, x: ExprId, depth: Option<usize>) -> usize {
+    let (
+        Node::Select {
+            then, otherwise, ..
+        },
+        Some(depth),
+    ) = (graph.node(x), depth)
+    else {
+        return 0;
+    };
+    jumps(graph, *then, depth).max(jumps(graph, *otherwise, depth))
 }
 
 /// Whether it is a sign or a choice.
@@ -192,14 +224,11 @@ fn is_jump(node: &Node) -> bool {
 /// Sizes of quantities that may vanish, and the limits of a sum of jumping terms where they do, as far as it has these from both sides and is
 /// not evaluated to them.
 fn limits_at_kinks(graph: &mut Graph, terms: &[Term], unknown: Unknown) -> Vec<(ExprId, ExprId)> {
-    let (mut kinks, mut pairs) = (Vec::new(), Vec::new());
+    let mut kinks = Vec::new();
     for (_, term) in terms {
         let mut own = Vec::new();
         add_kinks(graph, *term, MAX_SUMS, &mut own);
         own.truncate(MAX_KINKS);
-        for (at, kink) in own.iter().enumerate() {
-            pairs.extend(own[..at].iter().map(|other| [*other, *kink]));
-        }
         let new = own.into_iter().filter(|kink| !kinks.contains(kink));
         let new: Vec<ExprId> = new.collect();
         kinks.extend(new);
@@ -212,9 +241,10 @@ fn limits_at_kinks(graph: &mut Graph, terms: &[Term], unknown: Unknown) -> Vec<(
             found.push((size, limit));
         }
     }
-    pairs.retain(|pair| pair.iter().all(|kink| kinks.contains(kink)));
+    let pairs = kinks.iter().enumerate();
+    let pairs = pairs.flat_map(|(at, kink)| kinks[..at].iter().map(|other| [*other, *kink]));
+    let mut pairs: Vec<[ExprId; 2]> = pairs.collect();
     pairs.sort_unstable();
-    pairs.dedup();
     for pair in pairs {
         if let Some(limit) = limit_at_pair(graph, terms, (pair, unknown)) {
             let sizes = pair.map(|kink| (Constant::ONE, graph.call(Function::Abs, &[kink])));
@@ -239,9 +269,19 @@ fn add_kinks(graph: &mut Graph, term: ExprId, depth: usize, kinks: &mut Vec<Expr
                     add_zeros(graph, argument, MAX_DEPTH, kinks);
                 }
             }
-            Node::Select { left, right, .. } => {
+            Node::Select {
+                left,
+                right,
+                then,
+                otherwise,
+                ..
+            } => {
                 let difference = graph.subtract(left, right);
                 add_zeros(graph, difference, MAX_DEPTH, kinks);
+                if depth > 0 {
+                    add_kinks(graph, then, depth - 1, kinks);
+                    add_kinks(graph, otherwise, depth - 1, kinks);
+                }
             }
             Node::Sum { terms, .. } if depth > 0 => {
                 for (_, z) in terms {
@@ -323,28 +363,46 @@ fn limit_at(
     limit_from_both_sides(graph, (terms, unknown), &of_kink, (&leaf, &[zero]))
 }
 
-/// The same where two quantities of one variable do, which none of them does with the other for all values of parameters: x − a and x − b,
-/// or x² − 1 and x⁴ − 1.
+/// The same where two quantities do that change together, and of which none vanishes with the other for all values of parameters: x − a and
+/// b − x, or x² − 1 and x⁴ − 1.
 fn limit_at_pair(
     graph: &mut Graph,
     terms: &[Term],
     (pair, unknown): ([ExprId; 2], Unknown),
 ) -> Option<ExprId> {
-    let variables = |graph: &Graph, kink: ExprId| {
+    let leaf = common_variable(graph, pair)?;
+    let [first, second] = pair;
+    if is_known_at(graph, first, second) || is_known_at(graph, second, first) {
+        return None;
+    }
+    limit_from_both_sides(graph, (terms, unknown), terms, (&leaf, &pair))
+}
+
+/// A variable of two quantities that are functions of it alone, or of which one is a multiple of the other but for what is at rest, as
+/// x − y − a and b − x + y.
+fn common_variable(graph: &mut Graph, pair: [ExprId; 2]) -> Option<Input> {
+    let [of_first, of_second] = pair.map(|kink| {
         let mut inputs = graph.inputs_of(kink);
         inputs.retain(|input| !is_at_rest(input));
         inputs
-    };
-    let [of_first, of_second] = pair.map(|kink| variables(graph, kink));
-    let [leaf] = &of_first[..] else {
-        return None;
-    };
-    let [first, second] = pair;
-    let is_one = of_first == of_second;
-    if !is_one || is_known_at(graph, first, second) || is_known_at(graph, second, first) {
+    });
+    if of_first != of_second {
         return None;
     }
-    limit_from_both_sides(graph, (terms, unknown), terms, (leaf, &pair))
+    let leaf = of_first.first()?.clone();
+    if of_first.len() > 1 {
+        let slopes = pair.map(|kink| derivative(graph, kink, &leaf));
+        let [first, second] = slopes.map(|slope| graph.as_constant(slope));
+        let (first, second) = (first?, second?);
+        let terms = [(second, pair[0]), (-first, pair[1])];
+        let difference = graph.linear(Constant::ZERO, &terms);
+        let (_, rest) = graph.terms(difference);
+        let rest = graph.linear(Constant::ZERO, &rest);
+        if first.is_zero() || moves(graph, rest) {
+            return None;
+        }
+    }
+    Some(leaf)
 }
 
 /// Whether a quantity has a number as its value where another one vanishes.
@@ -419,139 +477,4 @@ fn solution(graph: &mut Graph, sum: ExprId, value: ExprId) -> Option<(ExprId, Ex
     let rest = graph.linear(constant, &others);
     let difference = graph.subtract(value, rest);
     Some((input, graph.scale(c.reciprocal()?, difference)))
-}
-
-/// How quantities approach zero as a leaf changes.
-struct Approach<'a> {
-    leaf: &'a Input,
-    /// What vanishes: the leaf itself, or expressions of it.
-    zeros: &'a [ExprId],
-    /// 1 from above, −1 from below, and 0 at zero itself.
-    side: i64,
-    /// The slopes found so far; `None` for those that vanish or are not known.
-    slopes: Map<ExprId, Option<ExprId>>,
-}
-
-impl<'a> Approach<'a> {
-    fn of(leaf: &'a Input, zeros: &'a [ExprId], side: i64) -> Self {
-        Self {
-            leaf,
-            zeros,
-            side,
-            slopes: Map::default(),
-        }
-    }
-
-    /// The limit of an expression without jumps but those at zero; `None` where it is not known.
-    fn limit(&mut self, graph: &mut Graph, x: ExprId, depth: usize) -> Option<ExprId> {
-        let depth = depth.checked_sub(1)?;
-        let mut mapping = Mapping::default();
-        for old in graph.reachable(&[x]) {
-            let node = graph.node(old).clone();
-            let new = match &node {
-                _ if self.zeros.contains(&old) => graph.constant(Constant::ZERO),
-                node if mapping.keeps(node) => continue,
-                node => self.limit_of_node(graph, node, &mapping, depth)?,
-            };
-            mapping.set(old, new);
-        }
-        Some(mapping.of(x))
-    }
-
-    /// The same of a node, from the limits of its children.
-    fn limit_of_node(
-        &mut self,
-        graph: &mut Graph,
-        node: &Node,
-        limits: &Mapping,
-        depth: usize,
-    ) -> Option<ExprId> {
-        match node {
-            Node::Call {
-                function: Function::Sign,
-                arguments,
-            } if self.side != 0 => {
-                let argument = *arguments.first()?;
-                if is_zero(graph, limits.of(argument)) {
-                    let slope = self.slope(graph, argument, depth)?;
-                    let sign = graph.call(Function::Sign, &[slope]);
-                    return Some(graph.scale(Constant::integer(self.side), sign));
-                }
-            }
-            Node::Select {
-                comparison,
-                left,
-                right,
-                then,
-                otherwise,
-            } if self.side != 0 && limits.of(*left) == limits.of(*right) => {
-                let (then, otherwise) = (limits.of(*then), limits.of(*otherwise));
-                if then == otherwise {
-                    return Some(then);
-                }
-                let difference = graph.subtract(*left, *right);
-                let slope = self.slope(graph, difference, depth)?;
-                let change = Constant::integer(self.side) * graph.as_constant(slope)?;
-                let holds = comparison.holds(change.to_f64(), 0.0);
-                return Some(if holds { then } else { otherwise });
-            }
-            _ if is_singular(graph, node, limits) => return None,
-            _ => {}
-        }
-        let new = graph.remake(node, limits);
-        let is_number = |x: ExprId| graph.as_constant(x).is_some();
-        let mut children = node.children().into_iter();
-        let is_known = is_number(new) || !children.all(|child| is_number(limits.of(child)));
-        is_known.then_some(new)
-    }
-
-    /// The limit of a derivative by the leaf, unless it vanishes.
-    fn slope(&mut self, graph: &mut Graph, x: ExprId, depth: usize) -> Option<ExprId> {
-        if let Some(known) = self.slopes.get(&x) {
-            return *known;
-        }
-        let slope = derivative(graph, x, self.leaf);
-        let limit = self.limit(graph, slope, depth);
-        let limit = limit.filter(|limit| !is_zero(graph, *limit));
-        self.slopes.insert(x, limit);
-        limit
-    }
-}
-
-/// Whether the limit of a node does not follow from those of its children.
-fn is_singular(graph: &Graph, node: &Node, limits: &Mapping) -> bool {
-    let vanishes = |x: &ExprId| is_zero(graph, limits.of(*x));
-    match node {
-        Node::Product(factors) => {
-            let diverges = |(y, n): &(ExprId, i32)| {
-                (*n < 0 && vanishes(y)) || may_diverge(graph, limits.of(*y), MAX_DEPTH)
-            };
-            factors.iter().any(|(y, _)| vanishes(y)) && factors.iter().any(diverges)
-        }
-        Node::Power { base, exponent } => {
-            let exponent = graph.as_constant(limits.of(*exponent));
-            vanishes(base) && exponent.is_some_and(|e| e.is_zero() || e.is_negative())
-        }
-        Node::Call {
-            function: Function::Atan2,
-            arguments,
-        } => arguments.iter().all(vanishes),
-        _ => false,
-    }
-}
-
-/// Whether there is a power of zero in it that is infinite for some values of parameters.
-fn may_diverge(graph: &Graph, x: ExprId, depth: usize) -> bool {
-    let Some(depth) = depth.checked_sub(1) else {
-        return true;
-    };
-    match graph.node(x) {
-        Node::Product(factors) => factors.iter().any(|(y, _)| may_diverge(graph, *y, depth)),
-        Node::Sum { terms, .. } => terms.iter().any(|(_, y)| may_diverge(graph, *y, depth)),
-        Node::Power { base, exponent } if is_zero(graph, *base) => {
-            let (number, terms) = graph.terms(*exponent);
-            number.is_negative() || terms.iter().any(|(c, _)| c.is_negative())
-        }
-        _ => false,
-    }
 }
