@@ -387,6 +387,9 @@ fn exponentials_of_poles() {
         ("x*exp(-1/x^2)", 0.0),
         ("exp(-1/abs(x))", 0.0),
         ("exp(-1/(3*abs(x)))", 0.0),
+        // The quotient 1/(3 |x|), which is infinite, is computed for the exponent.
+        ("x*exp(-1/(3*abs(x)))", 0.0),
+        ("x^2*exp(-1/(3*abs(x)))", 0.0),
         (bump, 1.0),
         (bump, -1.0),
         (bump, 1.0 - 1e-9),

@@ -1,6 +1,7 @@
 //! Tables of values, and for each operation what it could be replaced by.
 
 use super::residue::{Residue, residues};
+use crate::expr::function::Function;
 use crate::expr::hash::Map;
 use crate::expr::input::Input;
 use crate::expr::ordered::SortedMap;
@@ -102,8 +103,8 @@ pub(super) struct Search<'a> {
     pub(super) values: Vec<Residue>,
     pub(super) checks: Vec<Residue>,
     pub(super) reciprocals: Vec<Residue>,
-    /// One bit for each operation that is not defined everywhere.
-    partial: Vec<u64>,
+    /// What each operation may be undefined with.
+    partial: Vec<Partial>,
     leaves: Vec<Option<Leaves>>,
     pub(super) singles: Map<Residue, Vec<OpId>>,
     pub(super) products: Table,
@@ -179,7 +180,7 @@ impl<'a> Search<'a> {
     pub(super) fn usable(&self, target: OpId) -> Vec<bool> {
         let mut needs = vec![false; self.plan.len()];
         needs[target.index()] = true;
-        let (loops, partial) = (self.plan.loops_of(target), self.partial[target.index()]);
+        let (loops, defined) = (self.plan.loops_of(target), self.partial[target.index()]);
         let mut usable = vec![false; self.plan.len()];
         for id in self.plan.ids() {
             let at = id.index();
@@ -187,7 +188,7 @@ impl<'a> Search<'a> {
             needs[at] |= operands.iter().any(|operand| needs[operand.index()]);
             usable[at] = !needs[at]
                 && self.plan.loops_of(id) & !loops == 0
-                && self.partial[at] & !partial == 0
+                && self.partial[at].needs & !defined.falls_with == 0
                 && !self.values[at].is_zero();
         }
         usable
@@ -277,14 +278,39 @@ fn leaves(plan: &Plan) -> Vec<Option<Leaves>> {
     all
 }
 
-/// Bits of what is not defined, or not smooth, everywhere; all past the sixty-third share one.
-fn partial(plan: &Plan) -> Vec<u64> {
-    let mut bits: Vec<u64> = Vec::with_capacity(plan.len());
+/// Operations that are not defined, or not smooth, everywhere: one bit for each; all past the last but one share one.
+#[derive(Clone, Copy, Default)]
+struct Partial {
+    /// Those that an operation is computed from.
+    needs: u128,
+    /// Those with which it is infinite or not a number. Others are kept from it: by a choice, or as 1/x is from e^(−1/|x|), which is zero at
+    /// x = 0.
+    falls_with: u128,
+}
+
+fn partial(plan: &Plan) -> Vec<Partial> {
+    let mut all: Vec<Partial> = Vec::with_capacity(plan.len());
     let mut next = 0;
     for id in plan.ids() {
         let op = plan.op(id);
-        let operands = op.operands();
-        let mut own = operands.iter().fold(0, |all, x| all | bits[x.index()]);
+        let of = |x: &OpId| all[x.index()];
+        let mut own = Partial::default();
+        for x in op.operands() {
+            own.needs |= of(&x).needs;
+        }
+        own.falls_with = match op {
+            Op::Select {
+                then, otherwise, ..
+            } => of(then).falls_with & of(otherwise).falls_with,
+            Op::Divide(above, _) => of(above).falls_with,
+            Op::IntegerPower(x, n) if *n > 0 => of(x).falls_with,
+            Op::Power(..) | Op::IntegerPower(..) | Op::Loop { .. } => 0,
+            Op::Call(function, _) if !keeps_infinity(*function) => 0,
+            op => {
+                let operands = op.operands().into_iter();
+                operands.fold(0, |all, x| all | of(&x).falls_with)
+            }
+        };
         let whole = match op {
             Op::Divide(..) | Op::Power(..) | Op::Select { .. } | Op::Loop { .. } => false,
             Op::IntegerPower(_, n) => *n >= 0,
@@ -292,10 +318,25 @@ fn partial(plan: &Plan) -> Vec<u64> {
             _ => true,
         };
         if !whole {
-            own |= 1 << next;
-            next = (next + 1).min(63);
+            own.needs |= 1 << next;
+            own.falls_with |= 1 << next;
+            next = (next + 1).min(u128::BITS - 1);
         }
-        bits.push(own);
+        all.push(own);
     }
-    bits
+    all
+}
+
+/// Whether f(±∞) is infinite or not a number.
+fn keeps_infinity(function: Function) -> bool {
+    !matches!(
+        function,
+        Function::Exp
+            | Function::Atan
+            | Function::Atan2
+            | Function::Tanh
+            | Function::Sign
+            | Function::Min
+            | Function::Max
+    )
 }
