@@ -450,6 +450,9 @@ fn even_functions_of_distances_at_zero() {
         ("cosh(hypot(x, y)/l)", 4.0),
         ("l*ln(cosh(norm([x, y])/l))", 2.0),
         ("norm([x, y])*sin(norm([x, y]))", 2.0),
+        ("norm([x, y])*abs(sin(norm([x, y])))", 2.0),
+        ("sqrt(x^2 + y^2)*abs(tanh(sqrt(x^2 + y^2)))", 2.0),
+        ("abs(sin(hypot(x, y)))^2", 2.0),
         ("exp(-norm([x, y])^2)", -2.0),
     ] {
         let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
@@ -462,6 +465,12 @@ fn even_functions_of_distances_at_zero() {
         let expected = [-tangent, 0.0, 0.0, -tangent];
         assert_eq!(found.qq.concat(), expected, "{energy}");
     }
+    // So near zero that the third power of the distance is zero.
+    let text = "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - hypot(x, y)*abs(sin(hypot(x, y)))";
+    let found = results_of(text, &[], ALL, &[3e-160, 4e-160], &[0.0; 2]);
+    close(-found.q[0], 6e-160, "slope");
+    close(-found.qq[0][0], 2.0, "tangent");
+    assert!(found.qq[0][1].abs() <= 1e-150);
 }
 
 /// Functions of powers of distances with a field as exponent: e^(−h²) has the tangent −2 at zero, and e^(−h³) none.

@@ -68,8 +68,11 @@ impl Together {
             let Some(root) = norm.root.filter(|_| norm.has_parts()) else {
                 continue;
             };
-            let is_left = norm.diverges(graph, (inner, 1), MAX_SUMS);
-            if !is_left || norm.degree(graph, old, MAX_DEPTH) < -ROUNDING {
+            let degree = norm.degree(graph, old, MAX_DEPTH);
+            // A sum of higher degree is zero with its terms, whatever the signs are.
+            let is_left = norm.diverges(graph, (inner, 1), MAX_SUMS)
+                || (degree <= ROUNDING && has_sign_that_vanishes(graph, &norm, inner));
+            if !is_left || degree < -ROUNDING {
                 continue;
             }
             let trial = self.trial.get_or_insert_with(|| graph.clone());
@@ -83,6 +86,22 @@ impl Together {
         }
         new
     }
+}
+
+/// Whether there is the sign of something in a sum that vanishes with a norm, as of sin h: it is zero there, and one in all directions.
+fn has_sign_that_vanishes(graph: &Graph, norm: &Norm, sum: ExprId) -> bool {
+    let (_, terms) = graph.terms(sum);
+    let mut factors = terms.iter().flat_map(|(_, term)| factors_of(graph, *term));
+    factors.any(|(y, _)| match graph.node(y) {
+        Node::Call {
+            function: Function::Sign,
+            arguments,
+        } => {
+            let mut degrees = arguments.iter().map(|z| norm.degree(graph, *z, MAX_DEPTH));
+            degrees.any(|degree| degree > ROUNDING)
+        }
+        _ => false,
+    })
 }
 
 /// The limit of a sum where a norm vanishes, if it has one.
@@ -262,6 +281,27 @@ impl<'a> Direction<'a> {
                     _ => None,
                 }
             }
+            Node::Select {
+                comparison,
+                left,
+                right,
+                then,
+                otherwise,
+            } => {
+                let difference = graph.subtract(left, right);
+                let sign = match self.along(graph, difference, depth)? {
+                    Along::Zero => 0.0,
+                    Along::Lead(lead) => match graph.as_constant(lead.coefficient) {
+                        Some(number) if lead.is_exact => number.to_f64(),
+                        _ => return Some(self.as_it_is(graph, x)),
+                    },
+                };
+                let branch = match comparison.holds(sign, 0.0) {
+                    true => then,
+                    false => otherwise,
+                };
+                self.along(graph, branch, depth)
+            }
             Node::Call {
                 function,
                 arguments,
@@ -366,6 +406,9 @@ impl<'a> Direction<'a> {
     ) -> Option<Along> {
         let is_small = is_small_with_its_argument(function);
         let is_one = matches!(function, Function::Cos | Function::Cosh | Function::Exp);
+        if function == Function::Sign {
+            return self.along_sign(graph, x, argument, depth);
+        }
         if !is_small && !is_one && !matches!(function, Function::Sqrt | Function::Abs) {
             return Some(self.as_it_is(graph, x));
         }
@@ -386,6 +429,24 @@ impl<'a> Direction<'a> {
             Along::Lead(lead) if lead.degree <= ROUNDING => Some(self.as_it_is(graph, x)),
             Along::Lead(_) if is_one => Some(Along::lead(0.0, one)),
             Along::Lead(lead) => Some(Along::Lead(lead)),
+        }
+    }
+
+    /// The sign that something has near zero.
+    fn along_sign(
+        &self,
+        graph: &mut Graph,
+        x: ExprId,
+        argument: ExprId,
+        depth: usize,
+    ) -> Option<Along> {
+        match self.along(graph, argument, depth)? {
+            Along::Lead(lead) if lead.is_exact => {
+                let sign = graph.call(Function::Sign, &[lead.coefficient]);
+                Some(Along::lead(0.0, sign))
+            }
+            Along::Lead(_) => Some(self.as_it_is(graph, x)),
+            Along::Zero => Some(Along::Zero),
         }
     }
 }
