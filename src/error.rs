@@ -149,12 +149,21 @@ pub enum RunErrorKind {
         known: Vec<String>,
     },
     /// Infinitely many events follow each other in a finite time, because the motion comes to rest on the surface of
-    /// the event: an event happened a thousand times within one step, or twice within a millionth of a step, or forces
+    /// the event: an event happened twice within a millionth of a step, or events a thousand times within a thousandth of a step, or forces
     /// press the motion through the surface on which an [impact](crate::Occurrence::after_impact) has stopped it.
     EventsWithoutEnd {
         /// The event.
         name: String,
         /// The time at which the run stopped.
+        time: f64,
+    },
+    /// A [section](crate::Simulation::section) was not crossed within as many elements as a search may take.
+    NoCrossing {
+        /// The event.
+        name: String,
+        /// The time of the last crossing, or of the start.
+        from: f64,
+        /// The time up to which was searched.
         time: f64,
     },
     /// A parameter that was to be set, or by which to differentiate, does not exist in the model.
@@ -417,6 +426,13 @@ impl fmt::Display for RunErrorKind {
                 write!(
                     f,
                     "the event `{name}` repeats ever sooner and without end at t = {time}, because the motion comes to rest there: end the run with `Act::Stop`, or leave the motion unchanged with `Act::Record`"
+                )
+            }
+            Self::NoCrossing { name, from, time } => {
+                let (from, time) = (Short(*from), Short(*time));
+                write!(
+                    f,
+                    "the motion does not cross the section `{name}` from t = {from} to t = {time}: look at the surface and at the direction of the crossing, or search longer with `within(elements)`"
                 )
             }
             Self::NoParameter { name, known } => {

@@ -8,6 +8,7 @@ pub(super) mod on;
 mod order;
 mod remaining;
 pub(super) mod remodel;
+mod roundings;
 mod search;
 pub(super) mod searched;
 pub(super) mod settings;
@@ -27,6 +28,7 @@ use searched::Searched;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::fmt;
+use std::mem;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::Impulse;
@@ -59,8 +61,9 @@ pub(super) struct Events<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(super) met: Vec<Event<N, L>>,
     /// The events in the last element that did not end it.
     recorded: Vec<Place>,
-    /// The number of cuts in the current step.
+    /// The number of cuts in the current step since a time, at which counting has begun.
     cuts: u32,
+    since: f64,
     /// The length of the current step.
     step: f64,
 }
@@ -186,7 +189,8 @@ struct Done<const N: usize, L: Length<N>> {
 }
 
 impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
-    /// The largest number of events in one step; with more, events are taken to accumulate (Zeno behaviour).
+    /// After this number of events in one step it is examined whether they accumulate (Zeno behaviour): whether the mean
+    /// time between them is [`SOON`](Self::SOON).
     const MAX_CUTS: u32 = 1000;
 
     /// Events also accumulate if one recurs this soon, relative to the step: later ones are lost in rounding error.
@@ -275,14 +279,16 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             self.outputs(model, (time, state, &v), row);
         };
         let mut course = |function, part| self.course(run, dense, function, part);
+        let roundings = self.roundings(model, (t, arc.before));
         let (found, ends) = search::crossings(
-            &self.seen.sides,
+            (&self.seen.sides, &roundings),
             samples,
             resolution / h.abs(),
             &value,
             &mut course,
         );
         let mut remaining = Remaining::new(found, ends);
+        let mut is_begun: Vec<bool> = self.seen.sides.iter().map(|side| *side != 0.0).collect();
         if self.has_impacts() {
             let mut rows = [Vec::new(), Vec::new()];
             value(0.0, &mut rows[0]);
@@ -297,7 +303,8 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             }
             let met = self.located(run, arc, &root, resolution);
             // If the run begins on a zero, the polynomial may first move to the wrong side, by less than its error.
-            if met.time == arc.t && self.seen.sides[root.function] == 0.0 {
+            let begins = !mem::replace(&mut is_begun[root.function], true);
+            if begins && (met.time == arc.t || self.begins_wrongly(run, arc, &root, resolution)) {
                 remaining.take(root.function);
                 continue;
             }
@@ -363,7 +370,7 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             self.recorded.push(place);
             return Ok(None);
         }
-        self.cuts += 1;
+        let are_dense = self.count_cut(time);
         let is_it = |last: LastCut| last.function == function && self.is_soon(last.time, time);
         let returns = after.is_some() && self.seen.last.is_some_and(is_it);
         let is_idle = |after: &After<N, L>| after.set.is_none() && after.state == *state;
@@ -376,10 +383,20 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             impact: if is_idle { 0.0 } else { impact },
         });
         (self.seen.last, self.seen.lasts[function]) = (last, last);
-        if returns || self.cuts > Self::MAX_CUTS {
+        if returns || are_dense {
             return Err(RunErrorKind::EventsWithoutEnd { name, time });
         }
         Ok(Some(Done { place, after }))
+    }
+
+    /// Counts a cut; whether cuts of the current step accumulate.
+    fn count_cut(&mut self, time: f64) -> bool {
+        if self.cuts == 0 || self.cuts > Self::MAX_CUTS {
+            (self.cuts, self.since) = (0, time);
+        }
+        self.cuts += 1;
+        let least = f64::from(Self::MAX_CUTS) * Self::SOON * self.step.abs();
+        self.cuts > Self::MAX_CUTS && (time - self.since).abs() < least
     }
 
     /// Whether this is the last event, seen again because the polynomial starts with another velocity than the node.

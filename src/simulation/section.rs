@@ -32,9 +32,10 @@ where
     /// [`steps`](Self::steps).
     ///
     /// The points are as accurate as the nodes, and none is missed (see [`on`](Self::on) for the exceptions). The
-    /// section does not change the motion. If the motion never returns to the surface, the search for the next point
-    /// does not end; declare an event that [stops](Act::Stop) the motion, such as `event(late) = t - 1000`, to bound
-    /// the search.
+    /// section does not change the motion. If the motion does not return to the surface within ten million elements, or
+    /// within as many as [`within`](Section::within) says, the section ends with
+    /// [`RunErrorKind::NoCrossing`](crate::RunErrorKind::NoCrossing); an event that [stops](Act::Stop) the motion, such
+    /// as `event(late) = t - 1000`, ends it without an error.
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -66,9 +67,9 @@ where
         start: L::State,
         t0: f64,
     ) -> Section<'m, M, N, L> {
-        let mut run = self.clone();
+        let (mut run, name) = (self.clone(), name.into());
         run.events.watch_first(On {
-            name: name.into(),
+            name: name.clone(),
             function: None,
             crossing,
             act: Arc::new(|_| Act::Record),
@@ -78,6 +79,12 @@ where
         Section {
             chosen: run.chosen(),
             model: run.model.clone(),
+            search: Search {
+                name,
+                from: t0,
+                elements: 0,
+                most: MOST_ELEMENTS,
+            },
             way: Way::new(run.model.clone(), beginning, start, run.impulses),
             crossings: Crossings {
                 tangents: None,
@@ -129,8 +136,52 @@ where
 {
     chosen: Chosen,
     model: Share<'m, M>,
+    search: Search,
     way: Way<'m, M, N, L>,
     crossings: Crossings<'m, M, N, L>,
+}
+
+/// The number of elements between two points of a section, unless another one is asked for.
+const MOST_ELEMENTS: usize = 10_000_000;
+
+/// The search for the next point.
+struct Search {
+    /// The name of the event.
+    name: String,
+    /// The time of the last point, or of the start.
+    from: f64,
+    /// The number of elements since.
+    elements: usize,
+    /// The largest such number.
+    most: usize,
+}
+
+impl Search {
+    /// Counts an element that ends at a time; the error of a search that has come to its end.
+    fn count(&mut self, time: f64) -> Result<(), RunErrorKind> {
+        self.elements += 1;
+        if self.elements < self.most {
+            return Ok(());
+        }
+        Err(RunErrorKind::NoCrossing {
+            name: self.name.clone(),
+            from: self.from,
+            time,
+        })
+    }
+}
+
+impl<M, const N: usize, L> Section<'_, M, N, L>
+where
+    M: Sectioned<N, L>,
+    L: Length<N>,
+{
+    /// Looks for each point in at most so many elements from the one before, or from the start, instead of ten million.
+    #[must_use]
+    pub fn within(mut self, elements: usize) -> Self {
+        self.search.most = elements;
+        self
+    }
 }
 
 impl<M, const N: usize, L> fmt::Debug for Section<'_, M, N, L>
@@ -233,10 +284,18 @@ where
     fn next(&mut self) -> Option<Self::Item> {
         loop {
             if let Some(point) = self.crossings.points.pop_front() {
+                if let Ok(point) = &point {
+                    (self.search.from, self.search.elements) = (point.t, 0);
+                }
                 return Some(point);
             }
             match self.way.pass(&mut self.crossings)? {
-                Ok((Left::Done, _)) => {}
+                Ok((Left::Done, _)) if !self.crossings.points.is_empty() => {}
+                Ok((Left::Done, time)) => {
+                    if let Err(kind) = self.search.count(time) {
+                        self.way.course = Course::new(Err(kind));
+                    }
+                }
                 // Points before the end may still be in the queue.
                 Ok((Left::Stopped, _)) => return self.crossings.points.pop_front(),
                 Err(kind) => self.crossings.points.push_back(Err(kind)),

@@ -5,6 +5,7 @@ mod clear;
 mod derivatives;
 #[path = "../common/differences.rs"]
 mod differences;
+mod jumps;
 #[path = "../common/largest.rs"]
 mod largest;
 mod meeting;

@@ -80,39 +80,20 @@ impl<const N: usize, L: Length<N>> Events<'_, N, L> {
         /// How far a correction may lead beyond the element, relative to its length; it is then limited to the end.
         const OVERSHOOT: f64 = 0.5;
 
-        let Passage {
-            t, begin, h, dense, ..
-        } = *arc;
+        if self.jumps(run.model(), arc, root, resolution) {
+            return self.behind_jump(run, arc, root, resolution);
+        }
+        let h = arc.h;
         let enough = (0.25 * resolution).min(DIGITS * self.step.abs());
         let mut length = root.tau * h;
         let mut last = f64::INFINITY;
         let mut passed = None;
         let mut met = None;
         for _ in 0..MAX_TRIALS {
-            let time = arc.time(length, resolution);
-            let (state, inside) = if length.abs() > resolution {
-                let impulses = &arc.impulses[..acting::behind(arc.impulses, time, h)];
-                let solved = run.solved((begin, length), arc.before, impulses, (t, time))?;
-                (solved.0, Some(solved.1))
-            } else {
-                (arc.before.clone(), None)
-            };
-            let guess = dense.velocity_at_time(t + length);
-            let model = run.model();
-            let velocity = model.velocity(t + length, &state, &guess)?;
-            let values = self.row(model, (t + length, &state, &velocity));
-            let slopes = self.slopes(model, arc, length);
-            let (value, along) = (values[root.function], slopes[root.function]);
-            met = Some(Met {
-                length,
-                time,
-                state,
-                velocity,
-                values,
-                slopes,
-                inside,
-            });
-            let slope = self.slope(model, (arc, root), along, (length, value), passed);
+            let end = self.end_at(run, arc, length, resolution)?;
+            let (value, along) = (end.values[root.function], end.slopes[root.function]);
+            met = Some(end);
+            let slope = self.slope(run.model(), (arc, root), along, (length, value), passed);
             let change = -value / slope;
             let next = (length + change) * h.signum();
             let beyond = (-next).max(next - h.abs());
@@ -128,6 +109,128 @@ impl<const N: usize, L: Length<N>> Events<'_, N, L> {
             length = next.clamp(0.0, h.abs()) * h.signum();
         }
         met
+    }
+
+    /// Whether the function has the sign that it has before its first root on the polynomial alone, and not at the end of an
+    /// element that ends halfway to this root.
+    pub(super) fn begins_wrongly(
+        &self,
+        run: &mut dyn Searched<N, L>,
+        arc: &Passage<'_, N, L>,
+        root: &Root,
+        resolution: f64,
+    ) -> bool {
+        let halfway = self.end_at(run, arc, 0.5 * root.tau * arc.h, resolution);
+        halfway.is_some_and(|met| root.is_crossed_with(met.values[root.function]))
+    }
+
+    /// The end of an element of this length.
+    fn end_at(
+        &self,
+        run: &mut dyn Searched<N, L>,
+        arc: &Passage<'_, N, L>,
+        length: f64,
+        resolution: f64,
+    ) -> Option<Met<N, L>> {
+        let Passage {
+            t, begin, h, dense, ..
+        } = *arc;
+        let time = arc.time(length, resolution);
+        let (state, inside) = if length.abs() > resolution {
+            let impulses = &arc.impulses[..acting::behind(arc.impulses, time, h)];
+            let solved = run.solved((begin, length), arc.before, impulses, (t, time))?;
+            (solved.0, Some(solved.1))
+        } else {
+            (arc.before.clone(), None)
+        };
+        let guess = dense.velocity_at_time(t + length);
+        let model = run.model();
+        let velocity = model.velocity(t + length, &state, &guess)?;
+        let values = self.row(model, (t + length, &state, &velocity));
+        let slopes = self.slopes(model, arc, length);
+        Some(Met {
+            length,
+            time,
+            state,
+            velocity,
+            values,
+            slopes,
+            inside,
+        })
+    }
+
+    /// Whether the function jumps over zero, as a `select` or an input that is a step: it changes beside the root nearly as
+    /// much as in a wide part of the element, so that its slope tells nothing.
+    fn jumps(
+        &self,
+        model: &dyn EventModel<N, L>,
+        arc: &Passage<'_, N, L>,
+        root: &Root,
+        resolution: f64,
+    ) -> bool {
+        const WIDE: f64 = 1e-4;
+        const NARROW: f64 = 1e-8;
+        let Passage { t, h, dense, .. } = *arc;
+        let narrow = (4.0 * resolution / h.abs()).max(NARROW);
+        let at = |tau: f64| {
+            let time = t + tau.clamp(0.0, 1.0) * h;
+            let (state, v) = (dense.at_time(time), dense.velocity_at_time(time));
+            self.row(model, (time, &state, &v))[root.function]
+        };
+        let around = |part: f64| (at(root.tau - part), at(root.tau + part));
+        let ((before, behind), wide) = (around(narrow), around(WIDE));
+        narrow < 0.1 * WIDE
+            && root.is_crossed_with(behind - before)
+            && before * behind < 0.0
+            && (behind - before).abs() > 0.5 * (wide.1 - wide.0).abs()
+    }
+
+    /// The end of the shortest element, up to the resolution of the time, that ends behind a jump: of elements that end on
+    /// either side of it, beginning beside the root on the polynomial.
+    fn behind_jump(
+        &self,
+        run: &mut dyn Searched<N, L>,
+        arc: &Passage<'_, N, L>,
+        root: &Root,
+        resolution: f64,
+    ) -> Option<Met<N, L>> {
+        let (whole, direction) = (arc.h.abs(), arc.h.signum());
+        let mut end = |length: f64| self.end_at(run, arc, direction * length, resolution);
+        let is_behind = |met: &Met<N, L>| root.is_crossed_with(met.values[root.function]);
+        let (mut low, mut high) = (root.tau * whole, root.tau * whole);
+        let mut met = end(high)?;
+        let mut width = resolution;
+        if is_behind(&met) {
+            while low > 0.0 {
+                low = (low - width).max(0.0);
+                width *= 4.0;
+                let other = end(low)?;
+                if !is_behind(&other) {
+                    break;
+                }
+                (met, high) = (other, low);
+            }
+        } else {
+            while !is_behind(&met) {
+                if high >= whole {
+                    return None;
+                }
+                low = high;
+                high = (high + width).min(whole);
+                width *= 4.0;
+                met = end(high)?;
+            }
+        }
+        while high - low > resolution {
+            let middle = 0.5 * (low + high);
+            let other = end(middle)?;
+            if is_behind(&other) {
+                (met, high) = (other, middle);
+            } else {
+                low = middle;
+            }
+        }
+        Some(met)
     }
 
     /// dg/dt for a correction of the length: the secant through the last two nodes if it is close to the slope on the

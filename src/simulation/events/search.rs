@@ -86,12 +86,12 @@ fn places(samples: usize, course: &mut dyn FnMut((f64, f64)) -> Course) -> Vec<f
 }
 
 /// The zero crossings of the functions `values` (τ), and the signs of the functions at the end. `sides` are the signs
-/// at the start; zero if unknown. Signs are compared at the ends of parts in which `course` proves at most one
+/// at the start; zero if unknown: then values up to `roundings` have no sign. Signs are compared at the ends of parts in which `course` proves at most one
 /// crossing; without bounds, of about `samples` equal parts. A pair of crossings between samples is also found at the
 /// vertex of a parabola where a function comes close to zero. A crossing at the boundary of two parts belongs to the
 /// later one.
 pub(super) fn crossings(
-    sides: &[f64],
+    (sides, roundings): (&[f64], &[f64]),
     samples: usize,
     resolution: f64,
     values: &dyn Fn(f64, &mut Vec<f64>),
@@ -128,14 +128,15 @@ pub(super) fn crossings(
         };
         // If the sign is unknown, a small value at the start is rounding error of a zero; unless it is not finite.
         let rounding = if side == 0.0 && column[0].is_finite() {
-            4.0 * column[0].abs()
+            (4.0 * column[0].abs()).max(roundings[function])
         } else {
             0.0
         };
         // The rounding error of the time has the same effect, which is large in a short element.
         let rounded = (8.0 * resolution).max(1e-12);
         let finite = column.iter().filter(|value| value.is_finite());
-        let starts_off = column[0].abs() > rounded * finite.fold(0.0, |a: f64, b| a.max(b.abs()));
+        let largest = finite.fold(0.0, |a: f64, b| a.max(b.abs()));
+        let starts_off = column[0].abs() > (rounded * largest).max(roundings[function]);
         for k in 0..times.len() {
             let here = column[k];
             let is_known = side != 0.0 || starts_off || here.abs() > rounding;
@@ -196,7 +197,9 @@ mod tests {
 
     fn taus(side: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
         let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
-        let (roots, _) = crossings(&[side], 8, 1e-15, &values, &mut |_, _| Course::Unknown);
+        let (roots, _) = crossings((&[side], &[0.0]), 8, 1e-15, &values, &mut |_, _| {
+            Course::Unknown
+        });
         roots.iter().map(|root| root.tau).collect()
     }
 
@@ -236,6 +239,19 @@ mod tests {
         assert!(is_near(&hop, &[1e-3]), "{hop:?}");
     }
 
+    /// A function that begins on zero and falls, with rounding errors that first show it above zero.
+    #[test]
+    fn roundings_at_the_start_have_no_sign() {
+        let f = |tau: f64| if tau < 1e-9 { 1e-17 } else { 1e-16 - tau * tau };
+        let values = |tau: f64, row: &mut Vec<f64>| row.push(if tau == 0.0 { 0.0 } else { f(tau) });
+        let found = |rounding: f64| {
+            let mut course = |_, _: (f64, f64)| Course::Unknown;
+            crossings((&[0.0], &[rounding]), 8, 1e-15, &values, &mut course)
+        };
+        assert_eq!(found(0.0).0.len(), 1);
+        assert_eq!(found(1e-15), (Vec::new(), vec![-1.0]));
+    }
+
     /// A pair of roots that sampling would miss, with bounds of the derivative 2 (τ − 0.3).
     #[test]
     fn what_is_proved_is_found() {
@@ -252,7 +268,7 @@ mod tests {
                 Course::Bent
             }
         };
-        let (roots, sides) = crossings(&[1.0], 8, 1e-15, &values, &mut course);
+        let (roots, sides) = crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut course);
         let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
         assert!(is_near(&found, &[0.3, near]), "{found:?}");
         assert_eq!((sides, questions), (vec![1.0], 39));
@@ -273,7 +289,7 @@ mod tests {
                     Course::Bent
                 }
             };
-            let (roots, sides) = crossings(&[1.0], 8, 1e-15, &values, &mut course);
+            let (roots, sides) = crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut course);
             let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
             assert!(is_near(&found, &expected), "{found:?}");
             assert_eq!(sides, vec![1.0]);

@@ -180,6 +180,7 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             met: Vec::new(),
             recorded: Vec::new(),
             cuts: 0,
+            since: 0.0,
             step: 0.0,
         })
     }
