@@ -217,8 +217,14 @@ where
         state: &mut L::State,
     ) -> Result<(), RunErrorKind> {
         let Planned { number, t, h, .. } = *piece;
-        M::advance(stepper, (piece.begin, h), state, piece.impulses)
-            .map_err(|source| self.model.failed(number, (t, h), source))
+        M::advance(stepper, (piece.begin, h), state, piece.impulses).map_err(|source| {
+            let crosses_kinks = !M::FACTS.smooth && !self.chosen.at_kinks;
+            let source = match crosses_kinks {
+                true => source.across_kinks(),
+                false => source,
+            };
+            self.model.failed(number, (t, h), source)
+        })
     }
 
     /// The polynomial of the piece that was solved last.

@@ -94,6 +94,27 @@ fn an_accuracy_is_met() {
     }
 }
 
+/// Steps across the jump of a friction that holds the motion do not converge; the message says why.
+#[test]
+fn steps_across_a_jump_that_holds_the_motion_are_told_so() {
+    let held = Coulomb {
+        c: 3.0,
+        a: 0.5,
+        w: 1.3,
+    };
+    let run = Simulation::new(&held).element(Element::mixed(4)).step(0.1);
+    let error = run.run(held.state([1.0], [1.0]), 0.0..10.0);
+    let error = error.expect_err("no element holds the motion");
+    let RunErrorKind::Solve { source, .. } = *error.kind() else {
+        panic!("{error}");
+    };
+    assert!(
+        matches!(source, StepError::StalledAcrossKinks { .. }),
+        "{error}"
+    );
+    assert!(error.to_string().contains("at_kinks(true)"), "{error}");
+}
+
 /// If friction sticks, the motion stays at v = 0, and the equations as declared do not define it.
 #[test]
 fn sliding_is_told() {

@@ -180,6 +180,15 @@ pub enum StepError {
         /// The requested tolerance.
         tolerance: f64,
     },
+    /// An iteration did not converge in a model whose forces have kinks or jumps, where steps do not end.
+    StalledAcrossKinks {
+        /// The number of iterations done.
+        iterations: u32,
+        /// The last increment, relative to the state.
+        residual: f64,
+        /// The requested tolerance.
+        tolerance: f64,
+    },
     /// The fixed-point iteration did not converge, and Newton's method was not allowed.
     FixedPointStalled {
         /// The number of iterations done.
@@ -212,6 +221,31 @@ pub enum StepError {
     Legendre(LegendreError),
     /// A problem with the constraints.
     Constraint(ConstraintError),
+}
+
+impl StepError {
+    /// The same of a step that may have crossed kinks or jumps of forces, which are then the likely reason why an
+    /// iteration did not converge.
+    #[must_use]
+    pub fn across_kinks(self) -> Self {
+        match self {
+            Self::NewtonStalled {
+                iterations,
+                residual,
+                tolerance,
+            }
+            | Self::FixedPointStalled {
+                iterations,
+                residual,
+                tolerance,
+            } => Self::StalledAcrossKinks {
+                iterations,
+                residual,
+                tolerance,
+            },
+            other => other,
+        }
+    }
 }
 
 impl From<ConstraintError> for StepError {
@@ -255,6 +289,16 @@ impl fmt::Display for StepError {
             } => write!(
                 f,
                 "Newton's method did not converge: after {iterations} iterations the increment is {residual:.1e}, the tolerance {tolerance:.1e}; take a shorter step"
+            ),
+            Self::StalledAcrossKinks {
+                iterations,
+                residual,
+                tolerance,
+            } => write!(
+                f,
+                "the iteration did not converge: after {iterations} iterations the increment is {residual:.1e}, the tolerance {tolerance:.1e}; \
+                 forces of the model have kinks or jumps (`sign`, `abs`, `select` or the like), and where a jump holds the motion, as dry friction at rest, no step is short enough: \
+                 end steps there with `at_kinks(true)`, replace a jump by a continuous law, such as tanh(v/w) for sign(v), or take a shorter step"
             ),
             Self::FixedPointStalled {
                 iterations,
