@@ -4,6 +4,7 @@ mod checkpoints;
 mod indices;
 #[path = "../common/largest.rs"]
 mod largest;
+mod masses;
 mod models;
 mod steppers;
 mod units;

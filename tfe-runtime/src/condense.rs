@@ -237,11 +237,18 @@ impl System<'_> {
 
     /// Factors the tangent and solves for all right-hand sides.
     pub(crate) fn solve(self) -> Result<Self, StepError> {
-        let (size, columns) = (self.residual.len(), self.columns());
-        lu::factor(size, self.tangent, self.pivots).map_err(|singular| {
-            StepError::SingularTangent {
-                unknown: singular.column,
-            }
+        let size = self.residual.len();
+        self.solve_by(|tangent, pivots| lu::factor(size, tangent, pivots))
+    }
+
+    /// The same with another way to factor the tangent.
+    pub(crate) fn solve_by(
+        self,
+        factor: impl FnOnce(&mut [f64], &mut [usize]) -> Result<(), lu::Singular>,
+    ) -> Result<Self, StepError> {
+        let columns = self.columns();
+        factor(self.tangent, self.pivots).map_err(|singular| StepError::SingularTangent {
+            unknown: singular.column,
         })?;
         lu::solve_columns(self.tangent, self.pivots, columns, self.sides);
         Ok(self)

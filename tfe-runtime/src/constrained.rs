@@ -19,6 +19,7 @@ pub(crate) mod node;
 pub(crate) mod own;
 pub(crate) mod residual;
 pub(crate) mod rows;
+mod scaled;
 #[cfg(feature = "std")]
 mod start;
 #[cfg(feature = "alloc")]

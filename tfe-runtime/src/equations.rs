@@ -2,6 +2,7 @@
 
 use crate::error::StepError;
 use crate::legendre::larger;
+use crate::lu;
 use crate::model::State;
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
@@ -29,6 +30,17 @@ pub(crate) trait Equations {
         residual: &mut [f64],
         tangent: &mut [f64],
     ) -> Result<(), StepError>;
+
+    /// Factors the tangent.
+    #[inline(always)]
+    fn factor(
+        &self,
+        size: usize,
+        tangent: &mut [f64],
+        pivots: &mut [usize],
+    ) -> Result<(), lu::Singular> {
+        lu::factor(size, tangent, pivots)
+    }
 
     /// The size of an increment of x, relative to the state.
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment;

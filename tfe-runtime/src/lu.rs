@@ -184,33 +184,6 @@ pub(crate) fn is_lost(size: usize, factors: &[f64], column: usize, part: f64) ->
     !(factors[column * size + column].abs() > part * subtracted)
 }
 
-/// Ratios of inertias to entries of constraints that need no weight.
-const ALIKE: core::ops::RangeInclusive<f64> = 1e-8..=1e8;
-
-/// The weight with which rows of constraints have entries of the size of the inertias, a power of two, from the least
-/// [`ratio`] of these; one where they are of similar sizes.
-///
-/// Elimination subtracts rows of constraints from each other. The rounding errors of what should be zero then must not
-/// be chosen as pivots in the place of inertias: lengths of micrometres and masses of 1e-15 kg make moments of inertia
-/// of 1e-27 kg m² beside rows of the size of one. If columns of multipliers are eliminated first, the same holds for
-/// rows of inertias beside constraints.
-pub(crate) fn weight_of_rows(least: f64) -> f64 {
-    if ALIKE.contains(&least) || !least.is_finite() {
-        return 1.0;
-    }
-    // Sizes at which there is room for residuals and increments.
-    f64::from_bits(least.clamp(1e-200, 1e200).to_bits() & f64::INFINITY.to_bits())
-}
-
-/// The ratio of an inertia to an entry of a row of a constraint in the same column; infinite if one of them is zero:
-/// a coordinate without inertia has no size to compare with.
-pub(crate) fn ratio(inertia: f64, entry: f64) -> f64 {
-    if inertia == 0.0 || entry == 0.0 {
-        return f64::INFINITY;
-    }
-    (inertia / entry).abs()
-}
-
 /// The LU factors of a mass matrix, or of another N × N block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Block<const N: usize> {

@@ -491,7 +491,8 @@ pub(crate) fn newton(
         } = scratch;
         if fresh {
             equations.tangent(unknowns, step, tangent)?;
-            lu::factor(unknowns.len(), tangent, pivots).map_err(|singular| {
+            let factored = equations.factor(unknowns.len(), tangent, pivots);
+            factored.map_err(|singular| {
                 // A NaN in the model shows up here first.
                 if tangent.iter().all(|entry| entry.is_finite()) {
                     StepError::SingularTangent {

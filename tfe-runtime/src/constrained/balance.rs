@@ -4,7 +4,6 @@ use crate::basis::legendre_slopes;
 use crate::constrained::constrains::Constrains;
 use crate::constrained::element::{Declared, Derivatives, ElementConstraints, End, Output, Place};
 use crate::equations::weighted;
-use crate::lu::{ratio, weight_of_rows};
 use crate::velocity_form::{PointDerivatives, PointTangent};
 
 impl<const N: usize> ElementConstraints<'_, N> {
@@ -197,25 +196,12 @@ impl<const N: usize> ElementConstraints<'_, N> {
         }
         if let Some(Derivatives { tangent, by_start }) = &mut output.derivatives {
             let bend = self.rows.differentiate(model, end.t, &end.q, &end.v);
-            self.weight = commensurate(&end.second.zz, self.rows.rows);
             self.add_ends(declared, end, &bend, tangent);
             if !by_start.is_empty() {
                 self.add_end_by_start(declared, end, &bend, by_start);
             }
         }
     }
-}
-
-/// The weight of the rows of constraints beside the inertias of the coordinates.
-fn commensurate<const N: usize>(inertia: &[[f64; N]; N], rows: &[[f64; N]]) -> f64 {
-    let mut least = f64::INFINITY;
-    for row in rows {
-        for a in 0..N {
-            least = least.min(ratio(inertia[a][a], row[a]));
-        }
-    }
-    // Columns of rates are eliminated before those of multipliers.
-    weight_of_rows(least).min(1.0)
 }
 
 /// Σ rows_c μ_c

@@ -85,9 +85,8 @@ where
             system.sides[(row + 1) * columns - 1] = -residual;
         }
     }
-    form.constraints.weigh(system.tangent, size);
-    form.constraints.weigh(system.sides, columns);
-    let sides = &*system.solve()?.sides;
+    let factored = system.solve_by(|tangent, pivots| layout.factor(tangent, pivots))?;
+    let sides = &*factored.sides;
     for a in 0..N {
         for (u, weight) in scheme.advance.iter().enumerate() {
             for k in 0..columns {

@@ -21,6 +21,7 @@ use crate::control::{POSITION_ROUND_OFF, START_TOLERANCE};
 use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
 use crate::error::{ConstraintError, StepError};
 use crate::legendre::{conjugate, lagrangian_view_from, largest};
+use crate::lu;
 use crate::model::{Constraint, First, Model, Second, State};
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
@@ -51,8 +52,6 @@ pub(crate) struct ElementConstraints<'a, const N: usize> {
     pub(super) on_velocities: bool,
     /// Whether holonomic constraints act at the points.
     pub(super) on_positions: bool,
-    /// The factor of the rows of constraints in the system that is solved: see [`crate::lu::weight_of_rows`].
-    pub(super) weight: f64,
 }
 
 /// A point of the element.
@@ -115,7 +114,6 @@ impl<'a, const N: usize> ElementConstraints<'a, N> {
             impulse,
             on_velocities: false,
             on_positions: false,
-            weight: 1.0,
         };
         constraints.on_velocities = constraints.has(declared, false);
         constraints.on_positions = constraints.has(declared, true) && layout.degree() > 1;
@@ -289,18 +287,6 @@ impl<const N: usize> ElementConstraints<'_, N> {
         Increment { relative, ..inner }
     }
 
-    /// Multiplies the equations of the constraints, rows of so many columns, by their weight.
-    pub(super) fn weigh(&self, rows: &mut [f64], columns: usize) {
-        if self.weight == 1.0 {
-            return;
-        }
-        for row in self.layout.multipliers().flatten() {
-            for entry in &mut rows[row * columns..][..columns] {
-                *entry *= self.weight;
-            }
-        }
-    }
-
     /// The largest of the rates x of each coordinate, and of its velocity at the end.
     fn largest_rates(&self, x: &[f64]) -> [f64; N] {
         let mut sizes = by_coordinate(&x[..self.layout.rates()]);
@@ -418,10 +404,7 @@ where
     }
 
     fn residual(&mut self, x: &[f64], residual: &mut [f64]) -> Result<(), StepError> {
-        self.evaluate(x, residual, None)?;
-        // With the weight of the tangent that is in use.
-        self.constraints.weigh(residual, 1);
-        Ok(())
+        self.evaluate(x, residual, None)
     }
 
     fn tangent(
@@ -431,11 +414,16 @@ where
         tangent: &mut [f64],
     ) -> Result<(), StepError> {
         let by_start = &mut [];
-        self.evaluate(x, residual, Some(Derivatives { tangent, by_start }))?;
-        self.constraints.weigh(residual, 1);
-        self.constraints
-            .weigh(tangent, self.constraints.layout.size());
-        Ok(())
+        self.evaluate(x, residual, Some(Derivatives { tangent, by_start }))
+    }
+
+    fn factor(
+        &self,
+        _: usize,
+        tangent: &mut [f64],
+        pivots: &mut [usize],
+    ) -> Result<(), lu::Singular> {
+        self.constraints.layout.factor(tangent, pivots)
     }
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {

@@ -2,12 +2,12 @@
 //! velocity (T-161).
 
 use super::derivative::DualRows;
-use super::node::{border, is_regular};
+use super::node::{border, factor_bordered, is_regular};
 use super::states::chosen;
 use crate::condense::add_multiple;
 use crate::constrained::rows::rows_len;
 use crate::dual::Dual;
-use crate::error::{ConstraintError, StepError};
+use crate::error::StepError;
 use crate::lu;
 use crate::model::{First, Form, Model};
 use alloc::vec;
@@ -37,7 +37,7 @@ impl<const N: usize> HeldVelocity<N> {
     /// velocity of a momentum, and without constraints.
     ///
     /// # Errors
-    /// [`ConstraintError::SingularMass`] where the kinetic energy is singular for motions that the constraints allow.
+    /// [`SingularMass`](crate::error::ConstraintError::SingularMass) where the kinetic energy is singular for motions that the constraints allow.
     pub fn of<M: Model<N>>(
         model: &M,
         t: f64,
@@ -59,7 +59,7 @@ impl<const N: usize> HeldVelocity<N> {
         let mut matrix = vec![0.0; size * size];
         border(&mut matrix, &zz, &rows, &active);
         let mut pivots = vec![0; size];
-        lu::factor(size, &mut matrix, &mut pivots).map_err(|_| ConstraintError::SingularMass)?;
+        factor_bordered::<N>(size, &mut matrix, &mut pivots)?;
         let mut held = Self {
             matrix,
             pivots,

@@ -2,10 +2,11 @@
 
 use crate::constrained::constrains::Constrains;
 use crate::constrained::derivative::{DualRows, explicit};
+use crate::constrained::node::factor_bordered;
 use crate::constrained::rows::{dot, norm, rows_len, scaled, scaled_norm};
 use crate::constrained::states::chosen;
 use crate::dual::{Dual, duals};
-use crate::error::{ConstraintError, StepError};
+use crate::error::StepError;
 use crate::legendre::{LagrangianView, lagrangian_view_from};
 use crate::lu;
 use crate::model::{Model, Second, State};
@@ -128,7 +129,7 @@ fn balance<const N: usize>(
         vector[N + k] = -along.psi_slope(*c, v);
     }
     let mut pivots = vec![0; size];
-    lu::factor(size, &mut matrix, &mut pivots).map_err(|_| ConstraintError::SingularMass)?;
+    factor_bordered::<N>(size, &mut matrix, &mut pivots)?;
     lu::solve(size, &matrix, &pivots, &mut vector);
     if !vector.iter().all(|value| value.is_finite()) {
         return Err(StepError::NonFinite);

@@ -1,7 +1,9 @@
 //! The order of the unknowns of an element with constraints.
 
+use crate::constrained::scaled::{factor_scaled, scale_of_constraints};
 use crate::element::Element;
 use crate::error::ConstraintError;
+use crate::lu;
 use crate::model::Constraint;
 
 /// The unknowns and, in the same order, the equations: rates, interior multipliers, velocity at the end, multipliers of
@@ -52,6 +54,19 @@ impl Layout {
     /// negative.
     pub(crate) const fn node(&self, constraint: usize) -> usize {
         self.end(self.coordinates) + constraint
+    }
+
+    /// Factors the tangent. Rows of constraints have another unit than those of momenta, which is that of masses.
+    pub(crate) fn factor(
+        &self,
+        tangent: &mut [f64],
+        pivots: &mut [usize],
+    ) -> Result<(), lu::Singular> {
+        let (rates, end, node, size) = (self.rates(), self.end(0), self.node(0), self.size());
+        let is_constraint =
+            |equation: usize| (rates <= equation && equation < end) || node <= equation;
+        let scale = scale_of_constraints(size, tangent, end..node, node..size);
+        factor_scaled(size, tangent, pivots, (scale, &is_constraint))
     }
 
     /// The ranges of the multipliers, one for each constraint.

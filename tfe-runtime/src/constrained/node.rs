@@ -2,6 +2,7 @@
 
 use crate::constrained::constrains::Constrains;
 use crate::constrained::rows::{DEPENDENT, Rows, in_units, norm, scaled, subtract_part, unit};
+use crate::constrained::scaled::{factor_scaled, scale_of_constraints};
 use crate::error::{ConstraintError, LegendreError, StepError};
 use crate::lu;
 use crate::model::Form;
@@ -56,7 +57,7 @@ pub(crate) fn solve_velocity<const N: usize>(
         for (c, mark) in active.iter().enumerate() {
             vector[N + c] = if *mark == 0 { 0.0 } else { -rows.psi(c, &v) };
         }
-        lu::factor(size, matrix, pivots).map_err(|_| ConstraintError::SingularMass)?;
+        factor_bordered::<N>(size, matrix, pivots)?;
         let is_suspect = (0..size).any(|a| lu::is_lost(size, matrix, a, ROUNDINGS));
         if is_suspect && is_singular_where_allowed(&zz, rows, active) {
             return Err(ConstraintError::SingularMass.into());
@@ -177,6 +178,21 @@ pub(super) fn border<const N: usize>(
             matrix[a * size + row] = rows.rows[c][a];
         }
     }
+}
+
+/// Factors [ M ±Aᵀ ; A 0 ] of any size from N on.
+///
+/// # Errors
+/// [`ConstraintError::SingularMass`].
+pub(super) fn factor_bordered<const N: usize>(
+    size: usize,
+    matrix: &mut [f64],
+    pivots: &mut [usize],
+) -> Result<(), ConstraintError> {
+    let scale = scale_of_constraints(size, matrix, 0..N, N..size);
+    let is_constraint = |row: usize| row >= N;
+    factor_scaled(size, matrix, pivots, (scale, &is_constraint))
+        .map_err(|_| ConstraintError::SingularMass)
 }
 
 /// If a pivot of the mass matrix is below this fraction of its column, and of the terms subtracted from it, the
