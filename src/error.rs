@@ -149,8 +149,9 @@ pub enum RunErrorKind {
         known: Vec<String>,
     },
     /// Infinitely many events follow each other in a finite time, because the motion comes to rest on the surface of
-    /// the event: an event happened twice within a millionth of a step, or events a thousand times within a thousandth of a step, or forces
-    /// press the motion through the surface on which an [impact](crate::Occurrence::after_impact) has stopped it.
+    /// the event: an event happened twice within a millionth of a step, or events a thousand times within a thousandth
+    /// of a step, or forces press the motion through the surface on which an
+    /// [impact](crate::Occurrence::after_impact) has stopped it.
     EventsWithoutEnd {
         /// The event.
         name: String,
