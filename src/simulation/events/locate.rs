@@ -55,14 +55,27 @@ impl<const N: usize, L: Length<N>> Events<'_, N, L> {
         let length = root.tau * h;
         let state = dense.at_time(t + length);
         let velocity = dense.velocity_at_time(t + length);
+        let place = (length, arc.time(length, resolution));
+        self.met(run.model(), arc, place, (state, velocity, None))
+    }
+
+    /// The functions at a place of an element, given by its length and its time, where the motion has this state and this
+    /// velocity.
+    fn met(
+        &self,
+        model: &dyn EventModel<N, L>,
+        arc: &Passage<'_, N, L>,
+        (length, time): (f64, f64),
+        (state, velocity, inside): (L::State, L::Vector, Option<L::Polynomial>),
+    ) -> Met<N, L> {
         Met {
             length,
-            time: arc.time(length, resolution),
-            values: self.row(run.model(), (t + length, &state, &velocity)),
-            slopes: self.slopes(run.model(), arc, length),
+            time,
+            values: self.row(model, (arc.t + length, &state, &velocity)),
+            slopes: self.slopes(model, arc, length),
             state,
             velocity,
-            inside: None,
+            inside,
         }
     }
 
@@ -146,17 +159,7 @@ impl<const N: usize, L: Length<N>> Events<'_, N, L> {
         let guess = dense.velocity_at_time(t + length);
         let model = run.model();
         let velocity = model.velocity(t + length, &state, &guess)?;
-        let values = self.row(model, (t + length, &state, &velocity));
-        let slopes = self.slopes(model, arc, length);
-        Some(Met {
-            length,
-            time,
-            state,
-            velocity,
-            values,
-            slopes,
-            inside,
-        })
+        Some(self.met(model, arc, (length, time), (state, velocity, inside)))
     }
 
     /// Whether the function jumps over zero, as a `select` or an input that is a step: it changes beside the root nearly as
