@@ -73,16 +73,11 @@ impl<const N: usize> Assembly<N> {
         (fine, elements): (&P, usize),
         curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
     ) -> Result<(), AssemblyError> {
-        let mut halves = Self::new::<P::Model>(element, elements, 0, 0)?;
+        let unknowns = (Vec::new(), 0);
+        let size = |halves: &Self, iterate: &Iterate<N>| halves.size(fine, iterate).whole();
+        let change = Self::corrected(element, (fine, elements), unknowns, curve, size)?;
         // If the check itself fails, the solution is accepted.
-        let Ok(iterate) = halves.along(fine, curve, Vec::new()) else {
-            return Ok(());
-        };
-        let is_left = match halves.linearise(fine, &iterate) {
-            Ok(()) => halves.size(fine, &iterate).leaves(),
-            Err(AssemblyError::Singular { .. }) => false,
-            Err(_) => true,
-        };
+        let is_left = change.is_none_or(|change| change <= LEFT);
         if is_left {
             return Ok(());
         }
@@ -96,19 +91,13 @@ impl<const N: usize> Assembly<N> {
     pub(crate) fn doubts<P: Problem<N>>(
         element: Element,
         (fine, elements): (&P, usize),
-        (globals, dense): (Vec<f64>, usize),
+        unknowns: (Vec<f64>, usize),
         curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
     ) -> Vec<MeshWarning> {
-        let Ok(mut halves) = Self::new::<P::Model>(element, elements, globals.len(), dense) else {
+        let size = |halves: &Self, iterate: &Iterate<N>| halves.part_of_extent(fine, iterate);
+        let change = Self::corrected(element, (fine, elements), unknowns, curve, size);
+        let Ok(Some(change)) = change else {
             return Vec::new();
-        };
-        let Ok(iterate) = halves.along(fine, curve, globals) else {
-            return Vec::new();
-        };
-        let change = match halves.linearise(fine, &iterate) {
-            Ok(()) => halves.part_of_extent(fine, &iterate),
-            Err(AssemblyError::Singular { .. }) => f64::INFINITY,
-            Err(_) => return Vec::new(),
         };
         let warning = MeshWarning::Unresolved {
             elements: elements / 2,
@@ -120,6 +109,26 @@ impl<const N: usize> Assembly<N> {
         } else {
             Vec::new()
         }
+    }
+
+    /// The size of one Newton correction on a mesh of half the element length (`fine`), for a solution given as a curve
+    /// with its global unknowns: infinite where the equations are singular, `None` if there is no correction.
+    fn corrected<P: Problem<N>>(
+        element: Element,
+        (fine, elements): (&P, usize),
+        (globals, dense): (Vec<f64>, usize),
+        curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
+        size: impl FnOnce(&Self, &Iterate<N>) -> f64,
+    ) -> Result<Option<f64>, AssemblyError> {
+        let mut halves = Self::new::<P::Model>(element, elements, globals.len(), dense)?;
+        let Ok(iterate) = halves.along(fine, curve, globals) else {
+            return Ok(None);
+        };
+        Ok(match halves.linearise(fine, &iterate) {
+            Ok(()) => Some(size(&halves, &iterate)),
+            Err(AssemblyError::Singular { .. }) => Some(f64::INFINITY),
+            Err(_) => None,
+        })
     }
 
     /// The size of the last correction: of coordinates and momenta relative to their extents, of global unknowns relative
