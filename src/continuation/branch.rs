@@ -237,7 +237,8 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
         self.members.get(point).map(|member| &member.model)
     }
 
-    /// The model with the parameter of an event; `None` if there is no such event.
+    /// The model with the parameter of an event, such as to examine the orbit there or to start another branch at it;
+    /// `None` if there is no such event.
     pub fn event_model(&self, event: usize) -> Option<&M> {
         self.event_members.get(event).map(|member| &member.model)
     }

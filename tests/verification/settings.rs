@@ -121,7 +121,7 @@ fn numbers_of_any_size_are_short_in_messages() {
     }
 }
 
-/// No element ends at a break at NaN, so that a jump of a force there would be stepped over without a word.
+/// No element ends at a break at NaN, so that a jump of a force there would be stepped over without a warning.
 #[test]
 fn breaks_at_no_time_are_refused() {
     let start = PENDULUM.state([1.0], [0.0]);

@@ -152,7 +152,7 @@ impl Quadrature {
         }
     }
 
-    /// The rounding error of [`node`](Self::node): the exact value is the sum of both.
+    /// The rounding error of [`node`](Self::node): the node to twice the working precision is the sum of both.
     #[must_use]
     pub const fn node_correction(&self, index: usize) -> f64 {
         if index < MAX_POINTS {
@@ -162,7 +162,7 @@ impl Quadrature {
         }
     }
 
-    /// The rounding error of [`weight`](Self::weight): the exact value is the sum of both.
+    /// The rounding error of [`weight`](Self::weight): the weight to twice the working precision is the sum of both.
     #[must_use]
     pub const fn weight_correction(&self, index: usize) -> f64 {
         if index < MAX_POINTS {
