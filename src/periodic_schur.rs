@@ -49,7 +49,7 @@ mod tests;
 
 pub use error::PeriodicSchurError;
 
-pub(crate) use arithmetic::{exponent, power_of_two, reflection, size_in_all_units};
+pub(crate) use arithmetic::{exponent, power_of_two, reflection, times_power_of_two};
 pub(crate) use chain::balancing;
 
 use arithmetic::Scaled;

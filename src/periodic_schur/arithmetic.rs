@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, LN_2};
 use std::ops::Range;
 
 /// x · 2^exponent, without intermediate overflow.
-pub(super) fn times_power_of_two(mut x: f64, exponent: i64) -> f64 {
+pub(crate) fn times_power_of_two(mut x: f64, exponent: i64) -> f64 {
     // A factor of 2^±2200 takes every finite number to zero or infinity.
     let mut left = exponent.clamp(-2200, 2200);
     while left != 0 {
@@ -39,7 +39,7 @@ pub(super) fn largest<'a>(values: impl IntoIterator<Item = &'a f64>) -> f64 {
 
 /// max √|a_ij a_ji| of a square matrix of n rows, including the diagonal: a size that does not depend on the units of
 /// the coordinates.
-pub(crate) fn size_in_all_units(a: &[f64], n: usize) -> f64 {
+pub(super) fn size_in_all_units(a: &[f64], n: usize) -> f64 {
     let root = |row: usize, column: usize| a[row + column * n].abs().sqrt();
     let pairs = (0..n).flat_map(|i| (0..=i).map(move |j| (i, j)));
     pairs

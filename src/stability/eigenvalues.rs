@@ -1,7 +1,7 @@
 //! Eigenvalues of a real matrix by the QR algorithm, with a limit on its sweeps.
 
 use crate::numbers::larger;
-use crate::periodic_schur::size_in_all_units;
+use crate::periodic_schur::{balancing, power_of_two, reflection, times_power_of_two};
 use nalgebra::linalg::Hessenberg;
 use nalgebra::{Complex, DMatrix};
 use std::error::Error;
@@ -117,7 +117,7 @@ pub fn eigenvalues(matrix: &DMatrix<f64>) -> Result<Vec<Complex<f64>>, Eigenvalu
 /// Otherwise by QR on the balanced matrix. The implementation of nalgebra is not used: its shifts suffer from
 /// cancellation for matrices close to the identity, as those of short steps, and the iteration then stalls.
 pub(super) fn eigenvalues_of_finite(a: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
-    const MOST_SWEEPS: u32 = 200;
+    const MAX_SWEEPS: u32 = 200;
     /// The number of sweeps without a converged eigenvalue after which an exceptional shift is used.
     const EXCEPTIONAL: u32 = 10;
     let size = a.nrows();
@@ -150,7 +150,7 @@ pub(super) fn eigenvalues_of_finite(a: &DMatrix<f64>) -> Option<Vec<Complex<f64>
                     [h[(last, first)], h[(last, last)]],
                 ]));
             }
-            _ if sweeps < MOST_SWEEPS => {
+            _ if sweeps < MAX_SWEEPS => {
                 sweeps += 1;
                 double_shift_sweep(
                     &mut h,
@@ -202,7 +202,7 @@ fn double_shift_sweep(h: &mut DMatrix<f64>, first: usize, last: usize, is_except
     // cancellation near the identity, and the sweeps would stall.
     let z = h[(first, first)];
     let (r, s) = (x - z, y - z);
-    let mut column = [
+    let mut v = [
         (r * s - w) / h[(first + 1, first)] + h[(first, first + 1)],
         h[(first + 1, first + 1)] - z - r - s,
         h[(first + 2, first + 1)],
@@ -210,11 +210,12 @@ fn double_shift_sweep(h: &mut DMatrix<f64>, first: usize, last: usize, is_except
     for k in first..last {
         let rows = (last - k + 1).min(3);
         if k > first {
-            column = std::array::from_fn(|i| if i < rows { h[(k + i, k - 1)] } else { 0.0 });
+            v = std::array::from_fn(|i| if i < rows { h[(k + i, k - 1)] } else { 0.0 });
         }
-        let Some((v, factor)) = reflection(&column[..rows]) else {
+        let (factor, _) = reflection(&mut v[..rows]);
+        if factor == 0.0 {
             continue;
-        };
+        }
         for j in k.saturating_sub(1).max(first)..=last {
             let sum: f64 = (0..rows).map(|i| v[i] * h[(k + i, j)]).sum();
             for i in 0..rows {
@@ -233,19 +234,6 @@ fn double_shift_sweep(h: &mut DMatrix<f64>, first: usize, last: usize, is_except
             }
         }
     }
-}
-
-/// The Householder reflection: v and f such that 1 − f v vᵀ maps x to a multiple of the first unit vector; `None` if x
-/// is zero.
-fn reflection(x: &[f64]) -> Option<([f64; 3], f64)> {
-    let largest = x.iter().fold(0.0, |most: f64, entry| most.max(entry.abs()));
-    if largest == 0.0 || !largest.is_finite() {
-        return None;
-    }
-    let mut v: [f64; 3] = std::array::from_fn(|i| x.get(i).map_or(0.0, |entry| entry / largest));
-    let norm = v.iter().map(|entry| entry * entry).sum::<f64>().sqrt();
-    v[0] += norm.copysign(v[0]);
-    Some((v, 2.0 / v.iter().map(|entry| entry * entry).sum::<f64>()))
 }
 
 /// The eigenvalues of a 2 × 2 matrix with entries of any size; the off-diagonal ones enter only by their product.
@@ -290,47 +278,14 @@ fn of_moderate_two([[a, b], [c, d]]: [[f64; 2]; 2]) -> [Complex<f64>; 2] {
 ///
 /// Momenta and coordinates have different units, and QR is only accurate relative to the largest entry. A free
 /// coordinate has only a column of zeros, and a conserved momentum only a row of zeros, beside the diagonal: entries in
-/// such a row or column are made no larger than [`size_in_all_units`].
+/// such a row or column are made no larger than the others in all units; see [`balancing`].
 pub(super) fn balanced(a: &DMatrix<f64>) -> (DMatrix<f64>, Vec<f64>) {
-    const SWEEPS: usize = 8;
-    let size = size_in_all_units(a.as_slice(), a.nrows());
-    let mut a = a.clone();
-    let mut diagonal = vec![1.0; a.nrows()];
-    for _ in 0..SWEEPS {
-        let mut settled = true;
-        for i in 0..a.nrows() {
-            let others = |entries: &mut dyn Iterator<Item = &f64>| {
-                entries
-                    .enumerate()
-                    .filter(|&(j, _)| j != i)
-                    .map(|(_, entry)| entry.abs())
-                    .sum::<f64>()
-            };
-            let (row, column) = (
-                others(&mut a.row(i).iter()),
-                others(&mut a.column(i).iter()),
-            );
-            let ratio = if row > 0.0 && column > 0.0 {
-                0.5 * (row / column).log2()
-            } else if size == 0.0 {
-                continue;
-            } else {
-                let beyond = (row.max(column) / size).log2().max(0.0);
-                if row > 0.0 { beyond } else { -beyond }
-            };
-            let factor = ratio.round().clamp(-500.0, 500.0).exp2();
-            if factor != 1.0 {
-                settled = false;
-                a.column_mut(i).scale_mut(factor);
-                a.row_mut(i).unscale_mut(factor);
-                diagonal[i] *= factor;
-            }
-        }
-        if settled {
-            break;
-        }
-    }
-    (a, diagonal)
+    let n = a.nrows();
+    let mut exponents = vec![0; n];
+    balancing(a.abs().as_mut_slice(), 0.0, &mut exponents);
+    let scaled = |i, j| times_power_of_two(a[(i, j)], exponents[j] - exponents[i]);
+    let balanced = DMatrix::from_fn(n, n, scaled);
+    (balanced, exponents.into_iter().map(power_of_two).collect())
 }
 
 /// The scale of the rounding errors of QR in each entry, zeros included: the largest entry in balanced units.
