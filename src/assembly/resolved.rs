@@ -28,7 +28,7 @@ const LEFT: f64 = 0.5;
 const FARTHEST: f64 = 0.03;
 
 /// The least extent, relative to the values themselves: that of a motion at rest is its rounding errors.
-const LEAST: f64 = 1e-6;
+const MIN: f64 = 1e-6;
 
 impl Chain {
     /// Whether the equations are so close to singular that the solution should be checked.
@@ -47,6 +47,7 @@ impl Chain {
     }
 }
 
+#[cfg(feature = "sparse")]
 impl Size {
     /// Whether the correction on a mesh of half the element length confirms the solution.
     pub(crate) fn leaves(self) -> bool {
@@ -143,7 +144,7 @@ impl<const N: usize> Assembly<N> {
                 let high = values().fold(f64::NEG_INFINITY, larger);
                 let low = values().fold(f64::INFINITY, smaller);
                 raise(&mut extent, high - low);
-                raise(&mut extent, LEAST * larger(high.abs(), low.abs()));
+                raise(&mut extent, MIN * larger(high.abs(), low.abs()));
                 for e in 0..iterate.nodes.len() {
                     raise(&mut correction, self.chain().node(e)[kind * N + a].abs());
                 }
