@@ -25,9 +25,9 @@ mod trace;
 
 pub use estimated::{Attempt, Estimated, Picked};
 pub(crate) use grading::Grading;
-pub(crate) use pilot::{Course, Pair, explore};
+pub(crate) use pilot::{Pair, PilotSettings, explore};
 pub(crate) use search::{
-    Asked, Beside, Failed, Found, Graded, PairObserver, Pilot, Ran, RanBeside, Runner, Way,
-    damping_element_for, element_for, factor_for, next, search,
+    Asked, Failed, Found, Graded, PairComparison, PairObserver, PairRun, Pilot, Ran, RunSettings,
+    Runner, damping_element_for, element_for, factor_for, next, search,
 };
 pub(crate) use trace::{Trace, difference};

@@ -8,7 +8,7 @@ pub(crate) mod allowed;
 mod projection;
 
 use crate::numbers::{distance, larger, row_of};
-use allowed::Held;
+use allowed::ConstrainedMotions;
 use nalgebra::{DMatrix, DVector};
 use projection::{Led, Projection, all_hold, hold, holonomic, step_to_planes};
 use std::fmt;
@@ -239,7 +239,7 @@ pub trait ConsistentState<const N: usize>: Model<N> + Sized {
 impl<M: Model<N>, const N: usize> ConsistentState<N> for M {}
 
 /// The largest number of iterations of a projection.
-const MOST: u32 = 200;
+const MAX: u32 = 200;
 
 fn consistent<M: Model<N>, const N: usize>(
     model: &M,
@@ -261,7 +261,7 @@ fn consistent<M: Model<N>, const N: usize>(
         if is_reached {
             break;
         }
-        if projection.iterations == MOST {
+        if projection.iterations == MAX {
             return Err(ConsistentError::Unreached {
                 residuals: residuals(&q, &still),
                 iterations: projection.iterations,
@@ -359,7 +359,7 @@ pub fn tangent_basis<M: Model<N>, const N: usize>(
 }
 
 /// The motions that constraints with these derivatives allow.
-fn held<const N: usize>(declared: &[Constraint], gradients: &Gradients<N>) -> Held {
+fn held<const N: usize>(declared: &[Constraint], gradients: &Gradients<N>) -> ConstrainedMotions {
     let mut held = Vec::new();
     for (c, constraint) in declared.iter().enumerate() {
         if !gradients.independent[c] {
@@ -381,7 +381,7 @@ fn held<const N: usize>(declared: &[Constraint], gradients: &Gradients<N>) -> He
             second.zz[row][column - N]
         }
     });
-    Held {
+    ConstrainedMotions {
         gradients: held,
         to_momenta,
     }

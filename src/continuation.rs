@@ -61,7 +61,7 @@ pub use warning::BranchWarning;
 
 use crate::periodic::{PeriodicOrbit, Phase};
 use arc::Row;
-use follow::{Course, Follower, Steps};
+use follow::{Follower, ParameterPath, Steps};
 use problem::{Continued, Field, PeriodOf};
 use progress::Progress;
 use std::ops::Range;
@@ -306,10 +306,10 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         let (sensitivity, name) = self.sensitivity(field)?;
         branch.parameter = name;
         let mut model = self.model.clone();
-        let course = self.course(*field(&mut model))?;
+        let path = self.path(*field(&mut model))?;
         let (orbit, iterate, _) = self.orbit.solved()?;
         let problem = Continued {
-            width: (course.range.end - course.range.start).abs(),
+            width: (path.range.end - path.range.start).abs(),
             row: Row::Parameter(*field(&mut model)),
             model,
             orbit,
@@ -318,7 +318,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
             period: self.period.as_deref(),
             rate: 0.0,
         };
-        let follower = Follower::start(problem, iterate, self.orbit.method(), course)?;
+        let follower = Follower::start(problem, iterate, self.orbit.method(), path)?;
         follower.run(branch, Progress::new(self.progress))
     }
 
@@ -344,7 +344,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
     }
 
     /// The checked range and step sizes.
-    fn course(&self, value: f64) -> Result<Course, ContinuationErrorKind> {
+    fn path(&self, value: f64) -> Result<ParameterPath, ContinuationErrorKind> {
         let range = self.range.clone().ok_or(ContinuationErrorKind::NoRange)?;
         let Range { start, end } = range;
         let width = (end - start).abs();
@@ -371,7 +371,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
                 largest,
             });
         }
-        Ok(Course {
+        Ok(ParameterPath {
             range: start..end,
             steps: Steps {
                 first,

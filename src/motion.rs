@@ -23,8 +23,8 @@ pub use warning::Warning;
 pub(crate) use checkpoint::{LastCut, Reached, Seen};
 pub(crate) use node::action;
 pub(crate) use time::{
-    LEAST_ROUNDINGS, MOST_STEPS, breaks_within, count_steps, default_step, direction_of,
-    is_same_time, is_unresolved, leads_to_end, looked_at, sort_times,
+    MAX_STEPS, MIN_ROUNDINGS, breaks_within, count_steps, default_step, direction_of, is_same_time,
+    is_unresolved, leads_to_end, looked_at, sort_times,
 };
 
 pub use arcs::{MotionArc, Setting};

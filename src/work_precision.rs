@@ -15,7 +15,7 @@ pub(crate) mod subject;
 
 use crate::numbers::is_tolerance;
 use grid::Grid;
-use measure::{Measure, Way};
+use measure::{Discretisation, Measure};
 use peer::Rival;
 use reference::Source;
 use rounds::Timed;
@@ -330,7 +330,7 @@ impl<'m, M: Subject<S>, S: PhasePoint> WorkPrecision<'m, M, S> {
                     ..self.control
                 };
                 let look = |grid| {
-                    let way = Way {
+                    let way = Discretisation {
                         element,
                         control,
                         grid,

@@ -91,7 +91,7 @@ const SOLUTIONS: [&str; 3] = ["section", "PeriodicOrbit::solve", "BoundaryValue:
 /// How many calls returned a result, and how many were refused.
 type Count = BTreeMap<&'static str, [u32; 2]>;
 
-const MOST_STEPS: f64 = 300.0;
+const MAX_STEPS: f64 = 300.0;
 
 /// Some periods of the models. A longer step is solved in up to 1024 pieces. With events there may be a thousand of them
 /// in a step, each of which is found by up to eight such solutions, and a Hessian takes up to 49 gradients.
@@ -179,7 +179,7 @@ where
     let (start, step, span) = place(model, random);
     let steps = ((span.end - span.start) / step).abs();
     let is_fast = start.p.iter().any(|p| (1e4..f64::MAX).contains(&p.abs()));
-    if steps > MOST_STEPS || which == "hessian" && is_fast {
+    if steps > MAX_STEPS || which == "hessian" && is_fast {
         return None; // it would take too long
     }
     let element = random.element();

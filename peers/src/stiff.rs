@@ -63,7 +63,7 @@ fn jump(mut before: f64, mut after: f64) -> Result<f64, Box<dyn Error>> {
 /// The nodes of segments whose lengths halve towards each jump from both sides, down to the width of a jump.
 fn segments(jumps: &[f64]) -> Vec<f64> {
     /// The length of the shortest segment, a fraction of 1/μ: so close to the jump the motion is smooth again.
-    const LEAST: f64 = 1e-4;
+    const MIN: f64 = 1e-4;
     let mut nodes = vec![0.0, START.end];
     for (k, jump) in jumps.iter().enumerate() {
         let before = if k == 0 {
@@ -76,7 +76,7 @@ fn segments(jumps: &[f64]) -> Vec<f64> {
             .map_or(START.end, |next| 0.5 * (next + jump));
         for (sign, length) in [(-1.0, jump - before), (1.0, after - jump)] {
             let mut distance = length;
-            while distance > LEAST {
+            while distance > MIN {
                 nodes.push(jump + sign * distance);
                 distance *= 0.5;
             }
@@ -84,7 +84,7 @@ fn segments(jumps: &[f64]) -> Vec<f64> {
         nodes.push(*jump);
     }
     nodes.sort_by(f64::total_cmp);
-    nodes.dedup_by(|a, b| (*a - *b).abs() < 0.1 * LEAST);
+    nodes.dedup_by(|a, b| (*a - *b).abs() < 0.1 * MIN);
     nodes
 }
 

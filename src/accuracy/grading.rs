@@ -72,9 +72,9 @@ impl Grading {
     /// The nodes after `from` up to `to`, equally spaced in s, at most `step` apart.
     pub(crate) fn nodes(&self, from: f64, to: f64, step: f64) -> Vec<f64> {
         /// The largest number of steps; a longer run would take years.
-        const MOST: f64 = 1e9;
+        const MAX: f64 = 1e9;
         let (first, last) = (self.sum(from), self.sum(to));
-        let parts = ((last - first) / step).ceil().clamp(1.0, MOST);
+        let parts = ((last - first) / step).ceil().clamp(1.0, MAX);
         let inner = (1..parts as usize).map(|k| {
             let t = self.time(first + (last - first) * (k as f64 / parts));
             self.between(from, t, to)

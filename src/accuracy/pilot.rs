@@ -13,7 +13,7 @@ pub(crate) trait Pair {
         false
     }
     /// The differences between the two elements after that step, one for each kind of quantity.
-    fn apart(&self) -> &[f64];
+    fn differences(&self) -> &[f64];
     /// The largest magnitude of each kind so far, including that step.
     fn sizes(&self) -> &[f64];
     /// Accepts the step.
@@ -22,7 +22,7 @@ pub(crate) trait Pair {
 
 /// The specification of a pilot run.
 #[derive(Clone, Debug)]
-pub(crate) struct Course {
+pub(crate) struct PilotSettings {
     pub(crate) span: Range<f64>,
     /// Times at which elements must end.
     pub(crate) breaks: Vec<f64>,
@@ -39,36 +39,36 @@ pub(crate) struct Course {
 /// Safety factor: steps are shorter than the error estimate asks for.
 const SAFETY: f64 = 0.85;
 /// Limits of the ratio of successive steps.
-const LEAST_FACTOR: f64 = 0.15;
-const MOST_FACTOR: f64 = 5.0;
+const MIN_FACTOR: f64 = 0.15;
+const MAX_FACTOR: f64 = 5.0;
 /// The reduction of a step that failed.
 const FAILED: f64 = 0.25;
 /// The largest number of attempts; a longer pilot run costs more than it can save.
-const MOST_STEPS: usize = 200_000;
+const MAX_STEPS: usize = 200_000;
 /// The shortest step, relative to the time.
 const SHORTEST: f64 = 1e-14;
 /// The ratio of the longest to the shortest step below which equal steps are used.
 const VARIES: f64 = 3.0;
 
 /// An accepted step.
-struct Kept {
+struct AcceptedStep {
     h: f64,
-    apart: Vec<f64>,
+    differences: Vec<f64>,
 }
 
-/// The grading whose steps have the local error [`Course::local`]; `None` if equal steps are as good, or if the pilot
+/// The grading whose steps have the local error [`PilotSettings::local`]; `None` if equal steps are as good, or if the pilot
 /// run failed.
 ///
 /// A step h with the error e asks for the step h (local/e)^{1/(p+1)} (T-103).
-pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
-    let Range { start, end } = course.span;
+pub(crate) fn explore(settings: &PilotSettings, pair: &mut dyn Pair) -> Option<Grading> {
+    let Range { start, end } = settings.span;
     let direction = (end - start).signum();
     let mut nodes = vec![start];
-    let mut kept: Vec<Kept> = Vec::new();
+    let mut kept: Vec<AcceptedStep> = Vec::new();
     let mut t = start;
-    let mut wanted = course.first.min(course.longest);
+    let mut wanted = settings.first.min(settings.longest);
     let mut attempts = 0;
-    for corner in corners(&course.span, &course.breaks) {
+    for corner in corners(&settings.span, &settings.breaks) {
         while t != corner {
             attempts += 1;
             let left = (corner - t).abs();
@@ -79,11 +79,11 @@ pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
             } else {
                 wanted.min(left / 2.0)
             };
-            if attempts > MOST_STEPS || !(h > SHORTEST * t.abs().max(left * SHORTEST)) {
+            if attempts > MAX_STEPS || !(h > SHORTEST * t.abs().max(left * SHORTEST)) {
                 return None;
             }
             let off = if pair.attempt(t, direction * h) {
-                relative(pair.apart(), pair.sizes())
+                relative(pair.differences(), pair.sizes())
             } else {
                 f64::NAN
             };
@@ -94,14 +94,14 @@ pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
                 wanted = FAILED * h;
                 continue;
             }
-            let longer = SAFETY * course.factor(off);
-            wanted = (h * longer).min(course.longest);
-            if off > course.local {
+            let longer = SAFETY * settings.factor(off);
+            wanted = (h * longer).min(settings.longest);
+            if off > settings.local {
                 continue;
             }
-            kept.push(Kept {
+            kept.push(AcceptedStep {
                 h,
-                apart: pair.apart().to_vec(),
+                differences: pair.differences().to_vec(),
             });
             pair.keep();
             t = if h == left { corner } else { t + direction * h };
@@ -111,11 +111,11 @@ pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
     // The scale of a kind may have been small at first.
     let sizes = pair.sizes();
     let steps = kept.iter().map(|one| {
-        let step = one.h * course.factor(relative(&one.apart, sizes));
-        step.min(course.longest)
+        let step = one.h * settings.factor(relative(&one.differences, sizes));
+        step.min(settings.longest)
     });
     let steps: Vec<f64> = steps.collect();
-    if varies(course, &kept, &steps) {
+    if varies(settings, &kept, &steps) {
         Grading::new(&nodes, &steps)
     } else {
         None
@@ -124,11 +124,11 @@ pub(crate) fn explore(course: &Course, pair: &mut dyn Pair) -> Option<Grading> {
 
 /// Whether the steps that the errors ask for vary. Steps that could grow by more than the largest ratio are ignored:
 /// their length is not known.
-fn varies(course: &Course, kept: &[Kept], steps: &[f64]) -> bool {
+fn varies(settings: &PilotSettings, kept: &[AcceptedStep], steps: &[f64]) -> bool {
     let known = kept
         .iter()
         .zip(steps)
-        .filter(|(one, step)| **step < 0.999 * MOST_FACTOR * one.h || **step == course.longest);
+        .filter(|(one, step)| **step < 0.999 * MAX_FACTOR * one.h || **step == settings.longest);
     let (least, most) = known.fold((f64::INFINITY, 0.0), |(least, most), (_, step)| {
         (f64::min(least, *step), f64::max(most, *step))
     });
@@ -142,22 +142,22 @@ pub(crate) fn corners(span: &Range<f64>, breaks: &[f64]) -> Vec<f64> {
     corners
 }
 
-impl Course {
+impl PilotSettings {
     /// The ratio of the next step to one with a given error.
     fn factor(&self, off: f64) -> f64 {
         let factor = (self.local / off).powf(1.0 / self.power);
-        factor.clamp(LEAST_FACTOR, MOST_FACTOR)
+        factor.clamp(MIN_FACTOR, MAX_FACTOR)
     }
 }
 
 /// The largest relative difference; a difference of zero counts as zero for any scale.
-fn relative(apart: &[f64], sizes: &[f64]) -> f64 {
+fn relative(differences: &[f64], sizes: &[f64]) -> f64 {
     let mut most = 0.0;
-    for (apart, size) in apart.iter().zip(sizes) {
-        if *apart == 0.0 {
+    for (differences, size) in differences.iter().zip(sizes) {
+        if *differences == 0.0 {
             continue;
         }
-        let off = apart / size;
+        let off = differences / size;
         if !(off <= most) {
             most = off;
         }
@@ -172,7 +172,7 @@ mod tests {
     /// A law of errors for tests: a step has the error C(t) h⁵ with C = 1/w(t)⁵, and fails if it is longer than 2 w.
     struct Law<F> {
         wanted: F,
-        apart: Vec<f64>,
+        differences: Vec<f64>,
         kept: usize,
     }
 
@@ -181,12 +181,12 @@ mod tests {
             // The largest C within the step.
             let places = (0..=16).map(|k| t + h * f64::from(k) / 16.0);
             let wanted = places.map(&self.wanted).fold(f64::INFINITY, f64::min);
-            self.apart = vec![LOCAL * (h.abs() / wanted).powi(5)];
+            self.differences = vec![LOCAL * (h.abs() / wanted).powi(5)];
             h.abs() < 2.0 * wanted
         }
 
-        fn apart(&self) -> &[f64] {
-            &self.apart
+        fn differences(&self) -> &[f64] {
+            &self.differences
         }
 
         fn sizes(&self) -> &[f64] {
@@ -201,7 +201,7 @@ mod tests {
     const LOCAL: f64 = 1e-6;
 
     fn explored(span: Range<f64>, wanted: impl Fn(f64) -> f64) -> (Option<Grading>, usize) {
-        let course = Course {
+        let settings = PilotSettings {
             span,
             breaks: vec![3.0],
             longest: 1.0,
@@ -211,10 +211,10 @@ mod tests {
         };
         let mut pair = Law {
             wanted,
-            apart: Vec::new(),
+            differences: Vec::new(),
             kept: 0,
         };
-        (explore(&course, &mut pair), pair.kept)
+        (explore(&settings, &mut pair), pair.kept)
     }
 
     /// Where the step should be w(t), ρ is about 1/w, over four orders of magnitude.

@@ -14,11 +14,12 @@ use cuts::{again, cuts};
 use ladder::{Ladder, Verdict};
 use probe::probe;
 use runs::{
-    AIM, COARSER, Climbed, FIRST, LEAST_FACTOR, LEFT, LONGER, MOST_FACTOR, MOST_RUNS, MOST_STEPS,
+    AIM, COARSER, Climbed, FIRST, LEFT, LONGER, MAX_FACTOR, MAX_RUNS, MAX_STEPS, MIN_FACTOR,
     Noting, TIGHTEST, largest,
 };
 pub(crate) use runs::{
-    Asked, Beside, Failed, Found, Graded, PairObserver, Pilot, Ran, RanBeside, Runner, Way, next,
+    Asked, Failed, Found, Graded, PairComparison, PairObserver, PairRun, Pilot, Ran, RunSettings,
+    Runner, next,
 };
 use tfe_runtime::{Element, Solve, Statistics};
 
@@ -54,13 +55,13 @@ fn searched(
     pilot: Option<&mut Pilot<'_>>,
 ) -> Result<Found, RunErrorKind> {
     if let Some(graded) = &asked.graded {
-        return run_down(asked, graded_way(asked, graded), run);
+        return run_down(asked, graded_settings(asked, graded), run);
     }
     let length = (asked.span.end - asked.span.start).abs();
     let mut before = Vec::new();
     let climbed = if asked.in_pairs {
-        let most_steps = if pilot.is_some() { MANY } else { MOST_STEPS };
-        paired::climb(asked, newton_way(asked), run, most_steps)?
+        let most_steps = if pilot.is_some() { MANY } else { MAX_STEPS };
+        paired::climb(asked, newton_settings(asked), run, most_steps)?
     } else {
         None
     };
@@ -68,31 +69,31 @@ fn searched(
         Some(Climbed::Found(found)) => return Ok(*found),
         Some(Climbed::TooMany { attempts, step }) => {
             before = attempts;
-            Ok((newton_way(asked), step))
+            Ok((newton_settings(asked), step))
         }
-        None => even_way(asked, run),
+        None => even_settings(asked, run),
     };
     let Some(pilot) = pilot else {
         return run_down(asked, even?, run);
     };
-    if let Ok((way, step)) = &even
+    if let Ok((settings, step)) = &even
         && length / step <= MANY
     {
-        match climb(asked, (way.clone(), *step), run, MANY)? {
+        match climb(asked, (settings.clone(), *step), run, MANY)? {
             Climbed::Found(found) => return Ok(*found),
             Climbed::TooMany { attempts, step } => {
                 before = attempts;
-                even = even.map(|(way, _)| (way, step));
+                even = even.map(|(settings, _)| (settings, step));
             }
         }
     }
     let first = even.as_ref().map_or(1e-3 * length, |(_, step)| *step);
     let graded = pilot(first);
-    let way = match &graded {
-        Some(graded) => graded_way(asked, graded),
+    let settings = match &graded {
+        Some(graded) => graded_settings(asked, graded),
         None => even?,
     };
-    let mut found = run_down(asked, way, run)?;
+    let mut found = run_down(asked, settings, run)?;
     before.append(&mut found.picked.attempts);
     found.picked.attempts = before;
     Ok(found)
@@ -101,10 +102,10 @@ fn searched(
 /// Makes runs with decreasing steps; fails if these become too many.
 fn run_down(
     asked: &Asked,
-    way: (Way<'_>, f64),
+    settings: (RunSettings<'_>, f64),
     run: &mut dyn Runner,
 ) -> Result<Found, RunErrorKind> {
-    match climb(asked, way, run, MOST_STEPS)? {
+    match climb(asked, settings, run, MAX_STEPS)? {
         Climbed::Found(found) => Ok(*found),
         Climbed::TooMany { step, .. } => {
             let span = asked.span.end - asked.span.start;
@@ -141,9 +142,9 @@ pub(crate) fn damping_element_for(accuracy: f64) -> Element {
 }
 
 /// A trial with equal steps, solved by Newton's method, with the longest step allowed.
-fn newton_way<'a>(asked: &Asked) -> Way<'a> {
+fn newton_settings<'a>(asked: &Asked) -> RunSettings<'a> {
     let length = (asked.span.end - asked.span.start).abs();
-    Way {
+    RunSettings {
         element: (asked.element).unwrap_or_else(|| paired::element_for(asked.accuracy)),
         tolerance: 1e-3 * asked.accuracy,
         by_iteration: false,
@@ -155,8 +156,8 @@ fn newton_way<'a>(asked: &Asked) -> Way<'a> {
 }
 
 /// A trial with a grading, and its factor.
-fn graded_way<'a>(asked: &'a Asked, graded: &'a Graded) -> (Way<'a>, f64) {
-    let mut way = Way {
+fn graded_settings<'a>(asked: &'a Asked, graded: &'a Graded) -> (RunSettings<'a>, f64) {
+    let mut settings = RunSettings {
         element: graded.element,
         tolerance: 1e-3 * asked.accuracy,
         by_iteration: false,
@@ -165,17 +166,20 @@ fn graded_way<'a>(asked: &'a Asked, graded: &'a Graded) -> (Way<'a>, f64) {
         grading: Some(&graded.grading),
         keeps: false,
     };
-    let longest = way.lengths(asked).1;
-    way.step = longest;
-    (way, graded.factor.min(longest))
+    let longest = settings.lengths(asked).1;
+    settings.step = longest;
+    (settings, graded.factor.min(longest))
 }
 
 /// A trial with equal steps, and the step size that a probe at the start suggests.
-fn even_way<'a>(asked: &'a Asked, run: &mut dyn Runner) -> Result<(Way<'a>, f64), RunErrorKind> {
+fn even_settings<'a>(
+    asked: &'a Asked,
+    run: &mut dyn Runner,
+) -> Result<(RunSettings<'a>, f64), RunErrorKind> {
     let element = asked.element.unwrap_or_else(|| element_for(asked.accuracy));
     let length = (asked.span.end - asked.span.start).abs();
     let longest = asked.longest.map_or(length, |step| step.abs().min(length));
-    let mut way = Way {
+    let mut settings = RunSettings {
         element,
         tolerance: 1e-3 * asked.accuracy,
         by_iteration: asked.may_iterate,
@@ -184,14 +188,14 @@ fn even_way<'a>(asked: &'a Asked, run: &mut dyn Runner) -> Result<(Way<'a>, f64)
         grading: None,
         keeps: false,
     };
-    way.step = longest.min(length / FIRST);
-    let mut step = probe(asked, &mut way, longest, run);
+    settings.step = longest.min(length / FIRST);
+    let mut step = probe(asked, &mut settings, longest, run);
     if asked.may_iterate && step.as_ref().map_or(true, |(_, factor)| *factor > STIFF) {
         // The convergence of the fixed-point iteration, not the accuracy, limits the step.
-        let mut implicit = Way {
+        let mut implicit = RunSettings {
             by_iteration: false,
             step: longest,
-            ..way.clone()
+            ..settings.clone()
         };
         let by_newton = probe(asked, &mut implicit, longest, run);
         let longer = match (&step, &by_newton) {
@@ -200,67 +204,70 @@ fn even_way<'a>(asked: &'a Asked, run: &mut dyn Runner) -> Result<(Way<'a>, f64)
             _ => false,
         };
         if longer {
-            (step, way) = (by_newton, implicit);
+            (step, settings) = (by_newton, implicit);
         }
     }
     let (step, _) = step?;
     // With much longer steps the fixed-point iteration may not converge.
-    way.step = if way.by_iteration {
-        (way.step * LONGER).max(step)
+    settings.step = if settings.by_iteration {
+        (settings.step * LONGER).max(step)
     } else {
         longest
     };
-    Ok((way, step))
+    Ok((settings, step))
 }
 
 /// Makes runs with decreasing steps, the first one of about `step`.
 fn climb(
     asked: &Asked,
-    (way, step): (Way<'_>, f64),
+    (settings, step): (RunSettings<'_>, f64),
     run: &mut dyn Runner,
     most_steps: f64,
 ) -> Result<Climbed, RunErrorKind> {
-    let cuts = cuts(asked, way.grading, step);
-    let mut way = Way { cuts: &cuts, ..way };
-    let element = way.element;
-    let (length, longest) = way.lengths(asked);
-    way.tolerance = asked.tolerance(length / step);
-    way.step = (COARSER * step).min(longest).min(way.step);
-    let mut ladder = Ladder::new(element, asked.accuracy, way.grading.is_some());
+    let cuts = cuts(asked, settings.grading, step);
+    let mut settings = RunSettings {
+        cuts: &cuts,
+        ..settings
+    };
+    let element = settings.element;
+    let (length, longest) = settings.lengths(asked);
+    settings.tolerance = asked.tolerance(length / step);
+    settings.step = (COARSER * step).min(longest).min(settings.step);
+    let mut ladder = Ladder::new(element, asked.accuracy, settings.grading.is_some());
     let mut failure = None;
-    while ladder.attempts.len() < MOST_RUNS {
-        if length / way.step > most_steps {
-            let (attempts, step) = (ladder.attempts, way.step);
+    while ladder.attempts.len() < MAX_RUNS {
+        if length / settings.step > most_steps {
+            let (attempts, step) = (ladder.attempts, settings.step);
             return Ok(Climbed::TooMany { attempts, step });
         }
-        way.keeps = ladder.last.is_some();
-        let taken = way.taken();
-        let mut here = way.clone();
-        if !way.keeps {
+        settings.keeps = ladder.last.is_some();
+        let taken = settings.taken();
+        let mut here = settings.clone();
+        if !settings.keeps {
             // The error of the first run is much larger than that of the second; and amplified iteration errors become
             // visible in the comparison.
             here.tolerance *= (COARSER.powf(element.order() as f64) / 3.0).max(1.0);
         }
         match run.run(&here) {
             Ok(ran) => match ladder.climb(taken, ran) {
-                Verdict::Enough => match verify(&way, taken, &mut ladder, run) {
+                Verdict::Enough => match verify(&settings, taken, &mut ladder, run) {
                     Some(wanted) => {
-                        way.step = wanted;
-                        way.tolerance = (0.2 * way.tolerance).max(TIGHTEST);
+                        settings.step = wanted;
+                        settings.tolerance = (0.2 * settings.tolerance).max(TIGHTEST);
                     }
                     None => break,
                 },
                 Verdict::Shorter(wanted) => {
-                    way.step = wanted;
-                    if way.keeps {
+                    settings.step = wanted;
+                    if settings.keeps {
                         // Amplified iteration errors become visible in the comparison, as above.
-                        way.tolerance = (0.2 * way.tolerance).max(TIGHTEST);
+                        settings.tolerance = (0.2 * settings.tolerance).max(TIGHTEST);
                     }
                 }
-                Verdict::Floor if way.tolerance > TIGHTEST => {
-                    way.tolerance *= 1e-2;
-                    way.step = taken * MOST_FACTOR;
-                    ladder.apart = None;
+                Verdict::Floor if settings.tolerance > TIGHTEST => {
+                    settings.tolerance *= 1e-2;
+                    settings.step = taken * MAX_FACTOR;
+                    ladder.differences = None;
                 }
                 Verdict::Floor => break,
             },
@@ -268,7 +275,7 @@ fn climb(
             Err(failed) => {
                 ladder.fail(taken);
                 failure = Some(failed.kind);
-                way.step *= 0.6;
+                settings.step *= 0.6;
             }
         }
     }
@@ -276,15 +283,15 @@ fn climb(
         return Err(failure.unwrap_or(RunErrorKind::Step { step }));
     };
     let mut attempts = ladder.attempts;
-    let extremes = way.measure(&mut attempts);
+    let extremes = settings.measure(&mut attempts);
     Ok(Climbed::Found(Box::new(Found {
         is_met,
         picked: Picked {
             element,
             step: extremes.1,
             shortest: extremes.0,
-            tolerance: way.tolerance,
-            solve: if way.by_iteration {
+            tolerance: settings.tolerance,
+            solve: if settings.by_iteration {
                 Solve::FixedPoint
             } else {
                 asked.solve
@@ -304,18 +311,23 @@ fn climb(
 /// difference estimates its error independently of the runs with other steps. Returns a shorter step if the error is
 /// too large. Without a converging fixed-point iteration (stiff motion), the orders of both elements may be reduced
 /// alike; the estimate is then never decreased.
-fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut dyn Runner) -> Option<f64> {
+fn verify(
+    settings: &RunSettings<'_>,
+    taken: f64,
+    ladder: &mut Ladder,
+    run: &mut dyn Runner,
+) -> Option<f64> {
     let (_, last) = ladder.last.as_ref()?;
     let (errors, is_met) = ladder.errors.as_mut()?;
     if !*is_met {
         return None;
     }
-    let better = Way {
-        element: next(way.element)?,
-        tolerance: (VERIFIED * way.tolerance).max(TIGHTEST),
+    let better = RunSettings {
+        element: next(settings.element)?,
+        tolerance: (VERIFIED * settings.tolerance).max(TIGHTEST),
         step: again(taken),
         keeps: false,
-        ..way.clone()
+        ..settings.clone()
     };
     // If this run fails, the estimate stays.
     let ran = run.run(&better).ok()?;
@@ -334,9 +346,9 @@ fn verify(way: &Way<'_>, taken: f64, ladder: &mut Ladder, run: &mut dyn Runner) 
         return None;
     }
     *is_met = false;
-    ladder.apart = None;
+    ladder.differences = None;
     let factor = (ladder.accuracy / error).powf(1.0 / ladder.order) / AIM;
-    Some(taken * factor.clamp(LEAST_FACTOR, MOST_FACTOR))
+    Some(taken * factor.clamp(MIN_FACTOR, MAX_FACTOR))
 }
 
 #[cfg(test)]
@@ -352,14 +364,14 @@ mod tests {
         last: f64,
     }
 
-    impl<F: Fn(&Way<'_>, f64) -> f64> Runner for Law<F> {
-        fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
+    impl<F: Fn(&RunSettings<'_>, f64) -> f64> Runner for Law<F> {
+        fn run(&mut self, settings: &RunSettings<'_>) -> Result<Ran, Failed> {
             let mut trace = Trace::new(1, 0);
-            let step = way.taken();
-            for t in &way.cuts[1..] {
-                let off = (self.error)(way, step) * (t - way.cuts[0]) / 10.0;
+            let step = settings.taken();
+            for t in &settings.cuts[1..] {
+                let off = (self.error)(settings, step) * (t - settings.cuts[0]) / 10.0;
                 trace.pass(&[1.0 + off, 1.0], 0, true);
-                if way.keeps {
+                if settings.keeps {
                     self.last = off;
                 }
             }
@@ -369,38 +381,38 @@ mod tests {
             })
         }
 
-        fn run_beside(
+        fn run_pair(
             &mut self,
-            way: &Way<'_>,
-            better: &Way<'_>,
+            settings: &RunSettings<'_>,
+            better: &RunSettings<'_>,
             observer: &mut PairObserver<'_>,
-        ) -> Result<RanBeside, Failed> {
+        ) -> Result<PairRun, Failed> {
             let mut traces = [Trace::new(1, 0), Trace::new(1, 0)];
-            let step = way.taken();
-            let (start, steps) = (way.cuts[0], (10.0 / step).round() as u32);
+            let step = settings.taken();
+            let (start, steps) = (settings.cuts[0], (10.0 / step).round() as u32);
             let mut times = Vec::new();
             for k in 1..=steps {
                 let done = f64::from(k) / f64::from(steps);
-                let off = [way, better].map(|way| done * (self.error)(way, step));
+                let off = [settings, better].map(|settings| done * (self.error)(settings, step));
                 for (trace, off) in traces.iter_mut().zip(off) {
                     trace.pass(&[1.0 + off, 1.0], 0, true);
                 }
                 self.last = off[0];
                 times.push(start + 10.0 * done);
-                let goes_on = observer(&Beside {
+                let goes_on = observer(&PairComparison {
                     time: start + 10.0 * done,
-                    apart: &[(off[1] - off[0]).abs(), 0.0],
+                    differences: &[(off[1] - off[0]).abs(), 0.0],
                     sizes: &[1.0, 1.0],
                 });
                 if goes_on.is_break() {
-                    return Ok(RanBeside {
+                    return Ok(PairRun {
                         traces,
                         times,
                         is_complete: false,
                     });
                 }
             }
-            Ok(RanBeside {
+            Ok(PairRun {
                 traces,
                 times,
                 is_complete: true,
@@ -413,7 +425,7 @@ mod tests {
     fn found(
         accuracy: f64,
         contracts: bool,
-        error: impl Fn(&Way<'_>, f64) -> f64,
+        error: impl Fn(&RunSettings<'_>, f64) -> f64,
     ) -> Result<(Found, f64), RunErrorKind> {
         found_in(false, accuracy, contracts, error)
     }
@@ -422,7 +434,7 @@ mod tests {
         in_pairs: bool,
         accuracy: f64,
         contracts: bool,
-        error: impl Fn(&Way<'_>, f64) -> f64,
+        error: impl Fn(&RunSettings<'_>, f64) -> f64,
     ) -> Result<(Found, f64), RunErrorKind> {
         let asked = Asked {
             accuracy,
@@ -448,7 +460,8 @@ mod tests {
     #[test]
     fn finds_the_step_of_a_power_law() {
         for accuracy in [1e-2, 1e-4, 1e-6, 1e-9, 1e-12] {
-            let law = |way: &Way<'_>, step: f64| step.powi(way.element.order() as i32);
+            let law =
+                |settings: &RunSettings<'_>, step: f64| step.powi(settings.element.order() as i32);
             let (found, error) = found(accuracy, true, law).expect("runs");
             assert!(found.is_met && error <= accuracy, "{accuracy}: {error}");
             let estimate = found.picked.error_estimate;
@@ -470,8 +483,9 @@ mod tests {
     fn pairs_find_the_step_of_a_power_law() {
         for accuracy in [1e-2, 1e-4, 1e-6, 1e-9, 1e-12] {
             for scale in [0.3, 1.0, 10.0] {
-                let law =
-                    |way: &Way<'_>, step: f64| (step / scale).powi(way.element.order() as i32);
+                let law = |settings: &RunSettings<'_>, step: f64| {
+                    (step / scale).powi(settings.element.order() as i32)
+                };
                 let (found, error) = found_in(true, accuracy, false, law).expect("runs");
                 assert!(found.is_met && error <= accuracy, "{accuracy}: {error}");
                 let estimate = found.picked.error_estimate;
@@ -500,12 +514,18 @@ mod tests {
     /// with the tolerance is met.
     #[test]
     fn pairs_know_what_cannot_be_had() {
-        let noise = |way: &Way<'_>, step: f64| (1e5 * step + way.element.nodes() as f64).sin();
-        let (refused, _) =
-            found_in(true, 1e-12, false, |way, step| 1e-10 * noise(way, step)).expect("runs");
+        let noise = |settings: &RunSettings<'_>, step: f64| {
+            (1e5 * step + settings.element.nodes() as f64).sin()
+        };
+        let (refused, _) = found_in(true, 1e-12, false, |settings, step| {
+            1e-10 * noise(settings, step)
+        })
+        .expect("runs");
         assert!(!refused.is_met && refused.picked.error_estimate >= 1e-12);
         assert!(refused.picked.attempts.len() < 10);
-        let by_tolerance = |way: &Way<'_>, step: f64| 1e4 * way.tolerance * noise(way, step);
+        let by_tolerance = |settings: &RunSettings<'_>, step: f64| {
+            1e4 * settings.tolerance * noise(settings, step)
+        };
         let (found, error) = found_in(true, 1e-6, false, by_tolerance).expect("runs");
         assert!(found.is_met && error.abs() <= 1e-6, "{error}");
         let outcome = found_in(true, 1e-6, false, |_, _| f64::NAN);
@@ -527,7 +547,8 @@ mod tests {
         let noise = |step: f64| (1e5 * step).sin();
         let (refused, _) = found(1e-12, true, |_, step| 1e-10 * noise(step)).expect("runs");
         assert!(!refused.is_met && refused.picked.error_estimate >= 1e-12);
-        let by_tolerance = |way: &Way<'_>, step: f64| 1e4 * way.tolerance * noise(step);
+        let by_tolerance =
+            |settings: &RunSettings<'_>, step: f64| 1e4 * settings.tolerance * noise(step);
         let (found, error) = found(1e-6, true, by_tolerance).expect("runs");
         assert!(found.is_met && error.abs() <= 1e-6, "{error}");
     }
@@ -536,8 +557,8 @@ mod tests {
     struct Failing;
 
     impl Runner for Failing {
-        fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
-            let (time, step) = (1.0, way.step);
+        fn run(&mut self, settings: &RunSettings<'_>) -> Result<Ran, Failed> {
+            let (time, step) = (1.0, settings.step);
             Err(Failed::from(if step < 1e-14 {
                 let least = 1e-14;
                 RunErrorKind::StepUnresolved { time, step, least }
@@ -551,13 +572,13 @@ mod tests {
             }))
         }
 
-        fn run_beside(
+        fn run_pair(
             &mut self,
-            way: &Way<'_>,
-            _: &Way<'_>,
+            settings: &RunSettings<'_>,
+            _: &RunSettings<'_>,
             _: &mut PairObserver<'_>,
-        ) -> Result<RanBeside, Failed> {
-            Err(self.run(way).expect_err("all runs fail"))
+        ) -> Result<PairRun, Failed> {
+            Err(self.run(settings).expect_err("all runs fail"))
         }
     }
 
@@ -586,7 +607,11 @@ mod tests {
     fn what_is_never_finite_is_refused() {
         let outcome = found(1e-6, true, |_, _| f64::NAN);
         assert!(outcome.is_err() || outcome.is_ok_and(|(found, _)| !found.is_met));
-        let outcome = found(1e-6, true, |way, _| if way.keeps { f64::NAN } else { 0.0 });
+        let outcome = found(
+            1e-6,
+            true,
+            |settings, _| if settings.keeps { f64::NAN } else { 0.0 },
+        );
         assert!(outcome.is_ok_and(|(found, _)| !found.is_met));
     }
 }

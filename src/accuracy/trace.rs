@@ -45,9 +45,9 @@ impl Trace {
     }
 
     /// The largest difference of each kind between two rows.
-    pub(crate) fn apart(&self, a: &[f64], b: &[f64], apart: &mut Vec<f64>) {
-        apart.clear();
-        apart.extend(self.kinds.iter().map(|kind| {
+    pub(crate) fn differences(&self, a: &[f64], b: &[f64], differences: &mut Vec<f64>) {
+        differences.clear();
+        differences.extend(self.kinds.iter().map(|kind| {
             let pairs = a[kind.clone()].iter().zip(&b[kind.clone()]);
             // Infinite if something is not finite, since `f64::max` would ignore NaN.
             pairs.fold(0.0, |most: f64, (a, b)| most.max(finite((a - b).abs())))
@@ -78,7 +78,7 @@ pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
         } else if row + 1 < a.acts.len().min(b.acts.len()) && is_same(row + 1) {
             Side::Between
         } else {
-            Side::Apart
+            Side::Different
         }
     };
     let mut differences = Vec::new();
@@ -97,7 +97,7 @@ pub(crate) fn difference(a: &Trace, b: &Trace) -> Vec<Vec<f64>> {
         let at = |(row, pair)| match side(row) {
             Side::Same => relative(pair),
             Side::Between => 0.0,
-            Side::Apart => f64::INFINITY,
+            Side::Different => f64::INFINITY,
         };
         differences.push(a.rows().zip(b.rows()).enumerate().map(at).collect());
     }
@@ -110,7 +110,7 @@ enum Side {
     /// One run has passed an event that the other will pass before the next row.
     Between,
     /// One run has passed an event that the other does not pass.
-    Apart,
+    Different,
 }
 
 /// The largest magnitude including earlier ones. Infinite values, such as 1/x at zero, are skipped: relative to them

@@ -12,7 +12,7 @@ use tfe_runtime::{Model, State};
 const REST: f64 = 1e-5;
 
 /// The violation of a constraint at a node.
-struct Left {
+struct Violation {
     /// |φ| divided by the norm of its gradient.
     position: f64,
     /// |A v + a| divided by the norm of its row A.
@@ -64,7 +64,7 @@ pub(super) fn check<M: Model<N>, const N: usize>(
                 let terms = row.iter().zip(v).map(|(a, v)| a * v);
                 drift[c] + terms.sum::<f64>()
             };
-            left.push(Left {
+            left.push(Violation {
                 position: values[c].abs() / length,
                 velocity: v.as_ref().map_or(0.0, rate).abs() / length,
                 own: (own[c].0, v.as_ref().map_or(0.0, |_| own[c].1)),

@@ -5,7 +5,7 @@ use std::fmt;
 use tfe_runtime::condenser::Direction;
 
 /// The largest number of elements. A larger one is a mistake: the matrices of so many would need several gigabytes.
-const MOST_ELEMENTS: usize = 10_000_000;
+const MAX_ELEMENTS: usize = 10_000_000;
 
 /// The nodes of a mesh as fractions of its span, from 0 to 1.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,7 @@ impl Mesh {
         if elements == 0 {
             return Err(MeshError::NoElements);
         }
-        if elements > MOST_ELEMENTS {
+        if elements > MAX_ELEMENTS {
             return Err(MeshError::TooManyElements { elements });
         }
         if weights.is_empty() {
@@ -109,11 +109,11 @@ impl Mesh {
     }
 
     /// Lengths of elements that divide the solution into equal arc lengths in scaled time and phase space; the nodes
-    /// are momenta and coordinates. No more than [`MOST_ELEMENTS`] are made.
+    /// are momenta and coordinates. No more than [`MAX_ELEMENTS`] are made.
     pub(crate) fn equidistributed(&self, nodes: &[[&[f64]; 2]], elements: usize) -> Vec<f64> {
         /// A component that varies less than this, relative to its largest value, is constant up to rounding.
         const CONSERVED: f64 = 1e-9;
-        let elements = elements.min(MOST_ELEMENTS);
+        let elements = elements.min(MAX_ELEMENTS);
         let components = nodes.first().map_or(0, |[p, q]| p.len() + q.len());
         let component = |[p, q]: &[&[f64]; 2], k: usize| match k.checked_sub(p.len()) {
             None => p[k],
@@ -197,7 +197,7 @@ impl fmt::Display for MeshError {
             Self::NoElements => f.write_str("there must be at least one element"),
             Self::TooManyElements { elements } => write!(
                 f,
-                "{elements} elements are too many: at most {MOST_ELEMENTS} can be solved together"
+                "{elements} elements are too many: at most {MAX_ELEMENTS} can be solved together"
             ),
             Self::TooShort {
                 element,
@@ -251,7 +251,7 @@ mod tests {
         let nodes: Vec<[&[f64]; 2]> = (0..2).map(|k| [&p[k..=k], &q[k..=k]]).collect();
         let mesh = Mesh::new(1, &[]).expect("a mesh");
         let weights = mesh.equidistributed(&nodes, usize::MAX);
-        assert_eq!(weights.len(), MOST_ELEMENTS);
+        assert_eq!(weights.len(), MAX_ELEMENTS);
         assert!(mesh.equidistributed(&nodes, 0).is_empty());
     }
 

@@ -143,7 +143,7 @@ impl<T: Into<String>> From<T> for Axis {
 }
 
 /// The smallest positive number, so that ranges of the smallest numbers are not empty.
-const LEAST: f64 = f64::from_bits(1);
+const MIN: f64 = f64::from_bits(1);
 
 /// A nonempty range around [low, high], within the finite numbers.
 fn widened_linear(low: f64, high: f64, margin: f64) -> (f64, f64) {
@@ -153,7 +153,7 @@ fn widened_linear(low: f64, high: f64, margin: f64) -> (f64, f64) {
         if size == 0.0 {
             1.0
         } else {
-            (0.1 * size).max(LEAST)
+            (0.1 * size).max(MIN)
         }
     } else {
         margin * high - margin * low
@@ -169,7 +169,7 @@ fn widened_logarithmic(low: f64, high: f64, margin: f64) -> (f64, f64) {
         margin * decades
     };
     let factor = 10_f64.powf(room);
-    ((low / factor).max(LEAST), (high * factor).min(f64::MAX))
+    ((low / factor).max(MIN), (high * factor).min(f64::MAX))
 }
 
 /// A tick mark on an axis.

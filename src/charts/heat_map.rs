@@ -79,7 +79,7 @@ pub struct HeatMap {
 }
 
 /// The largest number of cells, 16384²; such a picture fits into memory.
-const MOST_CELLS: usize = 1 << 28;
+const MAX_CELLS: usize = 1 << 28;
 /// The distance of the colour bar from the frame, and its width, in pixels.
 const BAR: (f64, f64) = (16.0, 16.0);
 /// The height of a line of the legend above the frame, in pixels.
@@ -424,7 +424,7 @@ fn in_lines(entries: &[Entry], width: f64) -> Vec<Vec<Placed>> {
 fn is_too_large((columns, rows): (usize, usize)) -> bool {
     columns
         .checked_mul(rows)
-        .is_none_or(|cells| cells > MOST_CELLS)
+        .is_none_or(|cells| cells > MAX_CELLS)
 }
 
 /// The cells row by row from the bottom; empty if there are too many, which is reported later.

@@ -11,7 +11,7 @@ use {
 };
 
 /// The constraints on motions (δq, δv) at a state, and the matrix that maps these to (δp, δq).
-pub(super) struct Held {
+pub(super) struct ConstrainedMotions {
     /// Independent gradients in (q, v).
     pub(super) gradients: Vec<DVector<f64>>,
     /// ```text
@@ -21,7 +21,7 @@ pub(super) struct Held {
     pub(super) to_momenta: DMatrix<f64>,
 }
 
-impl Held {
+impl ConstrainedMotions {
     /// An orthonormal basis of the allowed motions, in the order (p, q).
     ///
     /// Momenta of light bodies are small relative to coordinates, those of heavy bodies large. Householder reflections
@@ -186,7 +186,7 @@ pub(crate) fn basis_of<M: family::Model>(
         let of_q = row.iter().copied().chain(std::iter::repeat_n(0.0, n));
         gradients.push(DVector::from_iterator(2 * n, of_q));
     }
-    let held = Held {
+    let held = ConstrainedMotions {
         gradients,
         to_momenta: parts.to_momenta,
     };

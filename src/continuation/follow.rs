@@ -28,13 +28,13 @@ pub(super) struct Steps {
 
 /// The range of the parameter and the steps of a continuation.
 #[derive(Clone, Debug)]
-pub(super) struct Course {
+pub(super) struct ParameterPath {
     pub(super) range: Range<f64>,
     pub(super) steps: Steps,
     pub(super) max_points: usize,
 }
 
-impl Course {
+impl ParameterPath {
     /// The end of the range that a parameter exceeds, if any.
     fn left(&self, parameter: f64) -> Option<f64> {
         let (low, high) = (
@@ -74,7 +74,7 @@ pub(super) struct Follower<'c, M, const N: usize> {
     problem: Continued<'c, M, N>,
     assembly: Assembly<N>,
     control: Control,
-    course: Course,
+    path: ParameterPath,
     metric: Metric<N>,
     frame: Frame<N>,
     last: Solved<M, N>,
@@ -89,7 +89,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         mut problem: Continued<'c, M, N>,
         mut iterate: Iterate<N>,
         (element, control): (Element, Control),
-        course: Course,
+        path: ParameterPath,
     ) -> Result<Self, OrbitError> {
         let elements = problem.orbit.mesh.elements();
         let (globals, dense) = (iterate.globals.len() + 1, problem.orbit.dense() + 1);
@@ -104,7 +104,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         let derivative = assembly.tangent();
         let metric = Metric::new(&problem.orbit, problem.width, &iterate, &derivative);
         let mut tangent = metric.unit(derivative);
-        if course.range.end < parameter {
+        if path.range.end < parameter {
             tangent.scale(-1.0);
         }
         let frame = Frame {
@@ -120,7 +120,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         signs.pass(&last.tests);
         // If more iterations are needed, the step is too long.
         let control = Control {
-            max_iterations: MOST_ITERATIONS,
+            max_iterations: MAX_ITERATIONS,
             ..control
         };
         Ok(Self {
@@ -129,7 +129,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             problem,
             assembly,
             control,
-            course,
+            path,
             metric,
             frame,
             last,
@@ -164,9 +164,9 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             first,
             smallest,
             largest,
-        } = self.course.steps;
+        } = self.path.steps;
         let mut step = (first / slope.max(1e-2)).clamp(smallest, largest);
-        while branch.points.len() < self.course.max_points {
+        while branch.points.len() < self.path.max_points {
             let taken = match self.step(step) {
                 Ok(taken) => taken,
                 Err(_) if step > smallest => {
@@ -292,11 +292,11 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
         }
         let row = self.metric.row(&last.member.iterate, &last.tangent, length);
         let (next, turn) = self.correct(guess, row)?;
-        if turn < MOST_TURN || self.comes_to_rest(&next.member.iterate) {
+        if turn < MAX_TURN || self.comes_to_rest(&next.member.iterate) {
             return Err(None);
         }
         let between = self.between(&next);
-        let Some((part, bound)) = between.exit(|parameter| self.course.left(parameter)) else {
+        let Some((part, bound)) = between.exit(|parameter| self.path.left(parameter)) else {
             return Ok(Step {
                 next,
                 turn,
@@ -304,7 +304,7 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
             });
         };
         let (next, turn) = self.correct(between.guess(part), Row::Parameter(bound))?;
-        if turn < MOST_TURN {
+        if turn < MAX_TURN {
             return Err(None);
         }
         Ok(Step {
@@ -552,7 +552,7 @@ fn is_compared(point: usize) -> bool {
 fn adapted(step: f64, iterations: u32, turn: f64) -> f64 {
     if iterations <= 4 && turn > EASY_TURN {
         1.5 * step
-    } else if iterations >= 7 || turn < 0.5 * (MOST_TURN + EASY_TURN) {
+    } else if iterations >= 7 || turn < 0.5 * (MAX_TURN + EASY_TURN) {
         0.7 * step
     } else {
         step
@@ -560,14 +560,14 @@ fn adapted(step: f64, iterations: u32, turn: f64) -> f64 {
 }
 
 /// The largest number of Newton iterations; more indicate that the step was too long.
-const MOST_ITERATIONS: u32 = 8;
+const MAX_ITERATIONS: u32 = 8;
 
 /// If the smallest step fails, the branch has come to rest if rest lies within this number of smallest steps: the
 /// equations lose digits close to it.
 const NEAR_REST: f64 = 10.0;
 
 /// The cosine of 25°, the largest angle between successive tangents.
-const MOST_TURN: f64 = 0.906;
+const MAX_TURN: f64 = 0.906;
 
 /// The cosine of 10°, the angle below which steps may grow.
 const EASY_TURN: f64 = 0.985;

@@ -25,7 +25,7 @@ pub(super) struct Halves<'c, M, const N: usize> {
 }
 
 /// An orbit of a branch beside that of elements of half the length.
-pub(super) struct Beside {
+pub(super) struct MeshComparison {
     own: Tests,
     finer: Option<Finer>,
 }
@@ -74,9 +74,9 @@ impl<'c, M: Model<N> + Clone, const N: usize> Halves<'c, M, N> {
         frame: &Frame<N>,
         metric: &Metric<N>,
         orbit: &Solved<M, N>,
-    ) -> Beside {
+    ) -> MeshComparison {
         let slope = orbit.tangent.globals.last().copied();
-        Beside {
+        MeshComparison {
             own: orbit.tests.with_slope(slope.unwrap_or(f64::NAN)),
             finer: self.finer(frame, &metric.on_halves(), orbit).ok(),
         }
@@ -129,7 +129,7 @@ fn on_halves<const N: usize>(tangent: &Iterate<N>) -> Iterate<N> {
 }
 
 /// The largest difference of a test function that is not an effect of the elements, relative to its values.
-const MOST: f64 = 0.5;
+const MAX: f64 = 0.5;
 
 /// The largest distance of the orbit of elements of half the length; runs have the same limit (T-121).
 const FARTHEST: f64 = 0.03;
@@ -144,11 +144,11 @@ impl Finer {
     }
 }
 
-impl Beside {
+impl MeshComparison {
     /// Whether dλ/ds is that of the model, up to a part of its values here and at the orbit before.
     pub(super) fn is_direction_left(&self, before: f64) -> bool {
         let own = self.own.value(EventKind::Fold);
-        let allowed = (MOST * own.abs().max(before.abs())).max(ROUND_OFF);
+        let allowed = (MAX * own.abs().max(before.abs())).max(ROUND_OFF);
         self.finer.as_ref().is_some_and(|finer| {
             let slope = finer.tests.value(EventKind::Fold);
             finer.is_near() && (slope - own).abs() <= allowed
@@ -170,14 +170,14 @@ impl Beside {
 
 /// Whether elements of half the length confirm that a test function changes its sign between two orbits; of one orbit,
 /// that the function has its size there.
-pub(super) fn are_confirmed(kind: EventKind, ends: &[Beside]) -> bool {
+pub(super) fn are_confirmed(kind: EventKind, ends: &[MeshComparison]) -> bool {
     let sizes = ends.iter().map(|end| end.own.value(kind).abs());
     let largest = sizes.fold(0.0, larger);
     // The sign of a determinant may depend on the number of elements, so sizes are compared and changes of signs.
-    let value = |end: &Beside| {
+    let value = |end: &MeshComparison| {
         let finer = end.finer.as_ref().filter(|finer| finer.is_near())?;
         let value = finer.tests.value(kind);
-        let is_left = (value.abs() - end.own.value(kind).abs()).abs() <= MOST * largest;
+        let is_left = (value.abs() - end.own.value(kind).abs()).abs() <= MAX * largest;
         is_left.then_some(value)
     };
     let Some(values) = ends.iter().map(value).collect::<Option<Vec<f64>>>() else {
@@ -206,8 +206,8 @@ mod tests {
     }
 
     /// An orbit with dλ/ds on its own elements and on those of half the length.
-    fn beside(own: f64, finer: f64) -> Beside {
-        Beside {
+    fn comparison(own: f64, finer: f64) -> MeshComparison {
+        MeshComparison {
             own: tests(own),
             finer: Some(Finer {
                 tests: tests(finer),
@@ -218,35 +218,35 @@ mod tests {
 
     #[test]
     fn an_event_has_its_values_on_finer_elements() {
-        let fold = |ends: [Beside; 2]| are_confirmed(EventKind::Fold, &ends);
-        assert!(fold([beside(0.1, 0.1001), beside(-0.2, -0.1999)]));
+        let fold = |ends: [MeshComparison; 2]| are_confirmed(EventKind::Fold, &ends);
+        assert!(fold([comparison(0.1, 0.1001), comparison(-0.2, -0.1999)]));
         // The finer elements have it just beside the first orbit.
-        assert!(fold([beside(1e-8, -1e-8), beside(-0.2, -0.2)]));
+        assert!(fold([comparison(1e-8, -1e-8), comparison(-0.2, -0.2)]));
         // A rotor on 60 elements towards a homoclinic orbit.
         assert!(!fold([
-            beside(-7.97e-9, -2.7e-10),
-            beside(4.5e-9, -3.5e-10)
+            comparison(-7.97e-9, -2.7e-10),
+            comparison(4.5e-9, -3.5e-10)
         ]));
         // The values of an effect of the elements, with the same changes of sign.
-        assert!(!fold([beside(-8e-9, -3e-11), beside(4e-9, 2e-11)]));
+        assert!(!fold([comparison(-8e-9, -3e-11), comparison(4e-9, 2e-11)]));
         // Only the sign of the second is one of the elements.
-        assert!(!fold([beside(1e-3, 1e-3), beside(-1e-4, 3e-5)]));
-        assert!(!fold([beside(0.1, f64::NAN), beside(-0.2, -0.2)]));
-        let none = Beside {
+        assert!(!fold([comparison(1e-3, 1e-3), comparison(-1e-4, 3e-5)]));
+        assert!(!fold([comparison(0.1, f64::NAN), comparison(-0.2, -0.2)]));
+        let none = MeshComparison {
             own: tests(-0.2),
             finer: None,
         };
-        assert!(!fold([beside(0.1, 0.1), none]));
+        assert!(!fold([comparison(0.1, 0.1), none]));
     }
 
     #[test]
     fn a_direction_is_left_beside_a_fold_but_not_where_all_are_small() {
-        assert!(beside(0.3, 0.31).is_direction_left(0.3));
+        assert!(comparison(0.3, 0.31).is_direction_left(0.3));
         // A point at a fold, after one away from it.
-        assert!(beside(1e-7, -1e-7).is_direction_left(0.1));
-        assert!(!beside(-1.9e-8, -1e-10).is_direction_left(-1.7e-8));
+        assert!(comparison(1e-7, -1e-7).is_direction_left(0.1));
+        assert!(!comparison(-1.9e-8, -1e-10).is_direction_left(-1.7e-8));
         // A branch along which the parameter is constant, up to rounding errors.
-        assert!(beside(1e-15, -3e-15).is_direction_left(0.0));
-        assert!(!beside(f64::NAN, 0.1).is_direction_left(0.1));
+        assert!(comparison(1e-15, -3e-15).is_direction_left(0.0));
+        assert!(!comparison(f64::NAN, 0.1).is_direction_left(0.1));
     }
 }

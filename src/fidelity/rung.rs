@@ -2,7 +2,7 @@
 
 use crate::error::RunErrorKind;
 use crate::work_precision::grid::Grid;
-use crate::work_precision::measure::{Way, advance};
+use crate::work_precision::measure::{Discretisation, advance};
 use crate::work_precision::{PhasePoint, Subject};
 use std::time::Duration;
 use tfe_runtime::Statistics;
@@ -41,15 +41,15 @@ pub(super) trait Runs {
     fn check_start(&self, grid: &Grid) -> Result<(), RunErrorKind>;
 
     /// Makes a run and records it; the clock is stopped while outputs are evaluated.
-    fn look(&self, way: Way<'_>, outputs: Outputs<'_>) -> Result<Seen, RunErrorKind>;
+    fn look(&self, scheme: Discretisation<'_>, outputs: Outputs<'_>) -> Result<Seen, RunErrorKind>;
 
     /// Makes a run without recording it.
-    fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind>;
+    fn time(&self, scheme: Discretisation<'_>) -> Result<Duration, RunErrorKind>;
 }
 
 impl<M: Subject<S>, S: PhasePoint> Scene<'_, M, S> {
-    fn stepper(&self, way: Way<'_>) -> Result<M::Stepper<'_>, RunErrorKind> {
-        self.model.stepper(way.element, way.control)
+    fn stepper(&self, scheme: Discretisation<'_>) -> Result<M::Stepper<'_>, RunErrorKind> {
+        self.model.stepper(scheme.element, scheme.control)
     }
 }
 
@@ -63,9 +63,9 @@ impl<M: Subject<S>, S: PhasePoint> Runs for Scene<'_, M, S> {
         self.model.check_start(&self.start, t..next, h)
     }
 
-    fn look(&self, way: Way<'_>, outputs: Outputs<'_>) -> Result<Seen, RunErrorKind> {
-        let mut stepper = self.stepper(way)?;
-        let (grid, mut state, mut time) = (way.grid, self.start.clone(), Duration::ZERO);
+    fn look(&self, scheme: Discretisation<'_>, outputs: Outputs<'_>) -> Result<Seen, RunErrorKind> {
+        let mut stepper = self.stepper(scheme)?;
+        let (grid, mut state, mut time) = (scheme.grid, self.start.clone(), Duration::ZERO);
         let steps = grid.steps() / outputs.parts;
         let mut rows = Vec::with_capacity(outputs.parts + 1);
         for part in 0..=outputs.parts {
@@ -82,8 +82,13 @@ impl<M: Subject<S>, S: PhasePoint> Runs for Scene<'_, M, S> {
         })
     }
 
-    fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind> {
-        let (grid, mut state) = (way.grid, self.start.clone());
-        advance::<M, S>(&mut self.stepper(way)?, grid, 0..grid.steps(), &mut state)
+    fn time(&self, scheme: Discretisation<'_>) -> Result<Duration, RunErrorKind> {
+        let (grid, mut state) = (scheme.grid, self.start.clone());
+        advance::<M, S>(
+            &mut self.stepper(scheme)?,
+            grid,
+            0..grid.steps(),
+            &mut state,
+        )
     }
 }

@@ -5,7 +5,7 @@ use super::rung::{Outputs, Runs, Seen};
 use super::truth::Truth;
 use crate::error::RunErrorKind;
 use crate::work_precision::grid::Grid;
-use crate::work_precision::measure::{Best, Way};
+use crate::work_precision::measure::{Best, Discretisation};
 use std::time::Duration;
 use tfe_runtime::Element;
 use tfe_runtime::step::Control;
@@ -20,7 +20,7 @@ pub(super) struct Search<'a> {
 
 /// A run that can be repeated.
 struct Trial<'a> {
-    way: Way<'a>,
+    scheme: Discretisation<'a>,
     outcome: Result<Found, RunErrorKind>,
     spent: Duration,
 }
@@ -53,7 +53,7 @@ impl<'a> Search<'a> {
         let mut end = End::new(smallest);
         let mut last = None;
         for grid in grids {
-            let way = Way {
+            let scheme = Discretisation {
                 element,
                 control: Control::default(),
                 grid,
@@ -61,7 +61,7 @@ impl<'a> Search<'a> {
             let seen = self
                 .rung
                 .check_start(grid)
-                .and_then(|()| self.rung.look(way, self.outputs));
+                .and_then(|()| self.rung.look(scheme, self.outputs));
             let outcome = seen.map(|seen| self.found(seen, last.take()));
             let is_last = match &outcome {
                 Ok(found) => {
@@ -75,7 +75,7 @@ impl<'a> Search<'a> {
             };
             let spent = outcome.as_ref().map_or(Duration::ZERO, |one| one.seen.time);
             self.trials.push(Trial {
-                way,
+                scheme,
                 outcome,
                 spent,
             });
@@ -110,7 +110,7 @@ impl<'a> Search<'a> {
                 spent: &mut trial.spent,
             };
             // The same run succeeded before.
-            best.repeat(until, || self.rung.time(trial.way).ok());
+            best.repeat(until, || self.rung.time(trial.scheme).ok());
         }
     }
 
@@ -133,7 +133,7 @@ impl<'a> Search<'a> {
         let least = self.truth.summary().uncertainty();
         let least = floor.map_or(least, |error| error.max(least));
         let point = |trial: Trial<'_>| {
-            let (element, step) = (trial.way.element, trial.way.grid.step());
+            let (element, step) = (trial.scheme.element, trial.scheme.grid.step());
             let choice = |found: Found| Choice {
                 rung: name.to_owned(),
                 element,

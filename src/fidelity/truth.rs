@@ -5,7 +5,7 @@ use super::rung::{Outputs, Runs};
 use crate::numbers::raise;
 use crate::work_precision::Reference;
 use crate::work_precision::grid::Grid;
-use crate::work_precision::measure::Way;
+use crate::work_precision::measure::Discretisation;
 use crate::work_precision::reference::{Halving, uncut};
 use std::ops::Range;
 use tfe_runtime::{Element, Mixed};
@@ -44,12 +44,12 @@ impl Truth {
             let grid = Grid::new(span, step);
             // Half the step of an existing mesh.
             let grid = &grid.unwrap_or_else(|_| fine.clone());
-            let way = Way {
+            let scheme = Discretisation {
                 element,
                 control: uncut(),
                 grid,
             };
-            rung.look(way, outputs).map(|seen| seen.rows)
+            rung.look(scheme, outputs).map(|seen| seen.rows)
         };
         let settled = halving.settle(run, |coarse, fine| distance(coarse, fine, &scales_of(fine)));
         let settled = settled.map_err(|failure| match failure {

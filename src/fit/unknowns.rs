@@ -10,7 +10,7 @@ pub(super) struct Unknowns {
     pub(super) names: Vec<String>,
     /// The indices of the parameters in the model.
     pub(super) parameters: Vec<usize>,
-    ways: Vec<Way>,
+    transformations: Vec<Transformation>,
     /// The first values.
     pub(super) first: Vec<f64>,
 }
@@ -19,7 +19,7 @@ pub(super) struct Unknowns {
 /// bound of X is the one closer to zero. If zero lies between the bounds, X is measured from zero, so that small values
 /// keep their digits even between distant bounds.
 #[derive(Clone, Copy, Debug)]
-struct Way {
+struct Transformation {
     /// 1, or −1 if the upper bound is closer to zero.
     sign: f64,
     low: f64,
@@ -40,7 +40,7 @@ enum Shape {
     Between { width: f64, shift: f64 },
 }
 
-impl Way {
+impl Transformation {
     /// The transformation of a value without bounds.
     const FREE: Self = Self {
         sign: 1.0,
@@ -161,7 +161,7 @@ impl Unknowns {
         let mut unknowns = Self {
             names: Vec::new(),
             parameters: Vec::new(),
-            ways: Vec::new(),
+            transformations: Vec::new(),
             first: Vec::new(),
         };
         for name in names {
@@ -190,7 +190,7 @@ impl Unknowns {
                 });
             }
             unknowns.parameters.push(index);
-            unknowns.push(name.clone(), Way::new(low, high, value), value);
+            unknowns.push(name.clone(), Transformation::new(low, high, value), value);
         }
         let stray = bounds.iter().find(|(own, ..)| !names.contains(own));
         if let Some((name, low, high)) = stray {
@@ -204,11 +204,11 @@ impl Unknowns {
         if !start_is_known {
             for a in 0..N {
                 let name = format!("momentum of {} at the start", M::coordinate_name(a));
-                unknowns.push(name, Way::FREE, start.p[a]);
+                unknowns.push(name, Transformation::FREE, start.p[a]);
             }
             for a in 0..N {
                 let name = format!("{} at the start", M::coordinate_name(a));
-                unknowns.push(name, Way::FREE, start.q[a]);
+                unknowns.push(name, Transformation::FREE, start.q[a]);
             }
         }
         if unknowns.names.is_empty() {
@@ -217,9 +217,9 @@ impl Unknowns {
         Ok(unknowns)
     }
 
-    fn push(&mut self, name: String, way: Way, value: f64) {
+    fn push(&mut self, name: String, transformation: Transformation, value: f64) {
         self.names.push(name);
-        self.ways.push(way);
+        self.transformations.push(transformation);
         self.first.push(value);
     }
 
@@ -229,20 +229,24 @@ impl Unknowns {
 
     /// The values for given unbounded variables, and their derivatives.
     pub(super) fn values(&self, numbers: &[f64]) -> (Vec<f64>, Vec<f64>) {
-        let ways = self.ways.iter().zip(numbers);
-        ways.map(|(way, u)| way.value(*u)).unzip()
+        let transformations = self.transformations.iter().zip(numbers);
+        transformations
+            .map(|(transformation, u)| transformation.value(*u))
+            .unzip()
     }
 
     /// The unbounded variable of a value of one unknown, moved by a distance away from a bound that is nearer than that;
     /// `None` if there is none.
     pub(super) fn released(&self, place: usize, value: f64, distance: f64) -> Option<f64> {
-        let way = self.ways[place];
-        Some(way.number(way.released(value, distance)?))
+        let transformation = self.transformations[place];
+        Some(transformation.number(transformation.released(value, distance)?))
     }
 
     /// The unbounded variables of the first values.
     pub(super) fn numbers(&self) -> Vec<f64> {
-        let ways = self.ways.iter().zip(&self.first);
-        ways.map(|(way, x)| way.number(*x)).collect()
+        let transformations = self.transformations.iter().zip(&self.first);
+        transformations
+            .map(|(transformation, x)| transformation.number(*x))
+            .collect()
     }
 }

@@ -10,13 +10,13 @@ pub(crate) fn is_same_time(a: f64, b: f64) -> bool {
 }
 
 /// The shortest step in ulps of the time; in a shorter one, points of the element would have equal times.
-pub(crate) const LEAST_ROUNDINGS: f64 = 64.0;
+pub(crate) const MIN_ROUNDINGS: f64 = 64.0;
 
 /// Whether no step leads from one time to the other: they are equal up to rounding, or too close for a step to be
 /// resolved.
 pub(crate) fn is_unresolved(a: f64, b: f64) -> bool {
     let size = a.abs().max(b.abs());
-    size < f64::INFINITY && (a - b).abs() <= LEAST_ROUNDINGS * f64::EPSILON * size
+    size < f64::INFINITY && (a - b).abs() <= MIN_ROUNDINGS * f64::EPSILON * size
 }
 
 /// Those of the given times that can be nodes in addition to the `known` ones, in their order. The others are within
@@ -37,7 +37,7 @@ pub(crate) fn looked_at(times: impl IntoIterator<Item = f64>, known: &[f64]) -> 
 }
 
 /// The largest number of steps. A larger one is a mistake in units: such a run would take years.
-pub(crate) const MOST_STEPS: f64 = 1e15;
+pub(crate) const MAX_STEPS: f64 = 1e15;
 
 /// The default step size of a run: one thousandth of the span; the whole span if that is too short to be divided.
 pub(crate) fn default_step(span: &Range<f64>) -> f64 {

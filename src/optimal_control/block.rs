@@ -15,7 +15,7 @@ use tfe_runtime::dual::Dual;
 use tfe_runtime::{Controlled, First, Form, MAX_INPUTS, Real};
 
 /// Numbers with derivatives in two directions: f, both first derivatives, and the mixed second derivative.
-type Twice = Dual<Dual>;
+type HyperDual = Dual<Dual>;
 
 /// A quadrature point of a block.
 #[derive(Clone, Debug)]
@@ -73,7 +73,13 @@ pub(super) trait PointFunctions {
     fn numbers(&self, t: f64, arguments: &[f64], costs: &[usize], answer: &mut Vec<f64>);
 
     /// Evaluates them with derivatives in two directions.
-    fn derivatives(&self, t: f64, arguments: &[Twice], costs: &[usize], answer: &mut Vec<Twice>);
+    fn derivatives(
+        &self,
+        t: f64,
+        arguments: &[HyperDual],
+        costs: &[usize],
+        answer: &mut Vec<HyperDual>,
+    );
 }
 
 /// The functions of a model with N coordinates.
@@ -84,7 +90,13 @@ impl<M: Controlled<N>, const N: usize> PointFunctions for Said<'_, M, N> {
         said(self.0, t, arguments, costs, answer);
     }
 
-    fn derivatives(&self, t: f64, arguments: &[Twice], costs: &[usize], answer: &mut Vec<Twice>) {
+    fn derivatives(
+        &self,
+        t: f64,
+        arguments: &[HyperDual],
+        costs: &[usize],
+        answer: &mut Vec<HyperDual>,
+    ) {
         said(self.0, t, arguments, costs, answer);
     }
 }
@@ -181,9 +193,12 @@ impl Block {
             let unit = |k: usize, at: usize| f64::from(u8::from(k == at));
             for i in 0..n {
                 for j in 0..=i {
-                    let twice: Vec<Twice> = (arguments.iter().enumerate())
+                    let twice: Vec<HyperDual> = (arguments.iter().enumerate())
                         .map(|(k, value)| {
-                            Twice::new(Dual::new(*value, unit(k, i)), Dual::new(unit(k, j), 0.0))
+                            HyperDual::new(
+                                Dual::new(*value, unit(k, i)),
+                                Dual::new(unit(k, j), 0.0),
+                            )
                         })
                         .collect();
                     model.derivatives(point.t, &twice, &self.costs, &mut answer);

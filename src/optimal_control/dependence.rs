@@ -5,20 +5,20 @@ use tfe_runtime::{Controlled, MAX_INPUTS, Real};
 
 /// Whether a number was computed from the input in question, whatever its value.
 #[derive(Clone, Copy, Debug)]
-struct Holds(bool);
+struct Depends(bool);
 
 /// For each output, whether it depends on an input. This is also found where the derivative vanishes, as for u dx/dt at
 /// rest.
 pub(super) fn holding<M: Controlled<N>, const N: usize>(model: &M, input: usize) -> Vec<bool> {
-    let none = Holds(false);
+    let none = Depends(false);
     let mut inputs = [none; MAX_INPUTS];
-    inputs[input] = Holds(true);
+    inputs[input] = Depends(true);
     let mut values = vec![none; model.columns()];
     model.observables_with(&inputs, none, &[none; N], &[none; N], &mut values);
     values.into_iter().map(|value| value.0).collect()
 }
 
-impl Holds {
+impl Depends {
     fn or(self, other: Self) -> Self {
         Self(self.0 || other.0)
     }
@@ -26,7 +26,7 @@ impl Holds {
 
 macro_rules! operators {
     ($($operator:ident $method:ident),*) => {$(
-        impl $operator for Holds {
+        impl $operator for Depends {
             type Output = Self;
             fn $method(self, other: Self) -> Self {
                 self.or(other)
@@ -37,19 +37,19 @@ macro_rules! operators {
 
 operators!(Add add, Sub sub, Mul mul, Div div);
 
-impl AddAssign for Holds {
+impl AddAssign for Depends {
     fn add_assign(&mut self, other: Self) {
         *self = self.or(other);
     }
 }
 
-impl SubAssign for Holds {
+impl SubAssign for Depends {
     fn sub_assign(&mut self, other: Self) {
         *self = self.or(other);
     }
 }
 
-impl Neg for Holds {
+impl Neg for Depends {
     type Output = Self;
     fn neg(self) -> Self {
         self
@@ -72,7 +72,7 @@ macro_rules! of_two {
     )*};
 }
 
-impl Real for Holds {
+impl Real for Depends {
     /// Whether a compared number depends on the input.
     type Mask = bool;
 

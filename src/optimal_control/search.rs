@@ -71,7 +71,7 @@ const MODELS: [(f64, f64); 11] = [
 ];
 
 /// The least curvature of a model along its step, relative to that of the cost alone.
-const LEAST_CURVATURE: f64 = 1e-3;
+const MIN_CURVATURE: f64 = 1e-3;
 
 /// The weights of the merit function relative to the multipliers: the usual and the largest ratio.
 const MARGIN: f64 = 1.1;
@@ -198,7 +198,7 @@ impl Problem<'_> {
                     outcome = Ok(());
                     break;
                 }
-                if !(step.curvature >= LEAST_CURVATURE * step.of_cost.abs()) {
+                if !(step.curvature >= MIN_CURVATURE * step.of_cost.abs()) {
                     continue;
                 }
                 let Some(margin) = margin(&step, &evaluation) else {
@@ -359,7 +359,7 @@ impl Problem<'_> {
 /// The ratio of weights to multipliers with which the merit decreases along a step; `None` if it would be too large.
 fn margin(step: &Step, now: &Evaluation) -> Option<f64> {
     let gaps = now.violation(&step.rows.iter().map(DVector::abs).collect::<Vec<_>>());
-    let needed = step.slope / gaps + LEAST_CURVATURE;
+    let needed = step.slope / gaps + MIN_CURVATURE;
     if step.slope - MARGIN * gaps < 0.0 {
         return Some(MARGIN);
     }

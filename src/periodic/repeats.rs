@@ -17,7 +17,7 @@ const GOLDEN: f64 = 0.381_966_011_250_105;
 
 /// The largest change after a period, as part of the changes within it. A period that was given with a few digits less
 /// than all makes an orbit that is wrong in those digits.
-const MOST: f64 = 1e-4;
+const MAX: f64 = 1e-4;
 
 /// The same as part of the rates themselves, which are rounded.
 const ROUNDINGS: f64 = 1e-9;
@@ -81,8 +81,8 @@ where
             }
         }
         // Sums of coordinates that have grown are rounded otherwise.
-        let rounded = if grows { MOST } else { ROUNDINGS };
-        if worst.1 > MOST * variation + rounded * size {
+        let rounded = if grows { MAX } else { ROUNDINGS };
+        if worst.1 > MAX * variation + rounded * size {
             return Err(OrbitError::NotRepeated {
                 period,
                 time: worst.0,

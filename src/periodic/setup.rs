@@ -13,12 +13,12 @@ use crate::simulation::Simulation;
 use tfe_runtime::{Element, LegendreError, Mixed, Model, Statistics, constrained, legendre};
 
 /// A curve t ↦ (q, dq/dt).
-type Around<'m, V> = Box<dyn Fn(f64) -> (V, V) + 'm>;
+type ClosedCurve<'m, V> = Box<dyn Fn(f64) -> (V, V) + 'm>;
 
 /// The first guess of Newton's method.
 pub(super) enum Guess<'m, const N: usize, L: Length<N>> {
     Rest,
-    Curve(Around<'m, L::Vector>),
+    Curve(ClosedCurve<'m, L::Vector>),
     Start(L::State),
 }
 

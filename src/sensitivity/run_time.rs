@@ -82,14 +82,14 @@ impl Factors {
 }
 
 /// Evaluates A v and Aᵀη with derivatives.
-struct Held<'a> {
+struct ConstraintProducts<'a> {
     v: &'a [f64],
     eta: &'a [f64],
     rates: Vec<Dual>,
     reactions: Vec<Dual>,
 }
 
-impl Entries<Dual> for Held<'_> {
+impl Entries<Dual> for ConstraintProducts<'_> {
     fn add(&mut self, _: Block, row: usize, column: usize, value: Dual) {
         self.rates[row] += value * Dual::new(self.v[column], 0.0);
         self.reactions[column] += value * Dual::new(self.eta[row], 0.0);
@@ -173,7 +173,7 @@ impl<'a, M: Model> Along<'a, M> {
     /// velocities and multipliers.
     fn add_held(&self, time: Dual, q: &[Dual], eta: &[f64], right: &mut Vec<f64>) {
         let mut drift = vec![Dual::ZERO; eta.len()];
-        let mut held = Held {
+        let mut held = ConstraintProducts {
             v: &self.node.v,
             eta,
             rates: drift.clone(),

@@ -23,7 +23,7 @@ use act::{Act, After, Event, On};
 use clear::Clear;
 use model::EventModel;
 use remaining::{Crossed, Remaining};
-use search::Course;
+use search::ZeroProof;
 use searched::Searched;
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -56,7 +56,7 @@ pub(super) struct Events<'m, const N: usize, L: Length<N> = FixedLength> {
     pub(super) seen: Seen,
     /// Events at the time of the last cut, or missed before it, that are still to be met.
     due: VecDeque<Crossed>,
-    rooms: Rooms,
+    rooms: Buffers,
     clear: Clear,
     pub(super) met: Vec<Event<N, L>>,
     /// The events in the last element that did not end it.
@@ -76,13 +76,13 @@ impl<const N: usize, L: Length<N>> fmt::Debug for Events<'_, N, L> {
 }
 
 /// Buffers for all outputs: values, bounds, and bounds with derivatives.
-struct Rooms {
+struct Buffers {
     values: RefCell<Vec<f64>>,
     bounds: RefCell<Vec<Enclosure>>,
     slopes: RefCell<Vec<Dual<Enclosure>>>,
 }
 
-impl Rooms {
+impl Buffers {
     fn new(columns: usize) -> Self {
         let zero = Dual::new(Enclosure::ZERO, Enclosure::ZERO);
         Self {
@@ -547,9 +547,9 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
         dense: &L::Polynomial,
         function: usize,
         part: (f64, f64),
-    ) -> Course {
+    ) -> ZeroProof {
         let Value::Column(column) = self.watched[function].value else {
-            return Course::Unknown;
+            return ZeroProof::Unbounded;
         };
         let length = dense.end() - dense.start();
         // The piece that contains the whole part, if there is one.
@@ -561,17 +561,17 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
         let holds = |(from, to): &(f64, f64)| *from >= 0.0 && *to <= 1.0;
         let mut pieces = dense.pieces().iter().map(|piece| (piece, place(piece)));
         let Some((piece, within)) = pieces.find(|(_, within)| holds(within)) else {
-            return Course::Bent;
+            return ZeroProof::Unproved;
         };
         let mut values = self.rooms.slopes.borrow_mut();
         run.outputs_over(piece, within, &mut values);
         let Dual { value, slope, .. } = values[column];
         if value.side() != 0.0 || slope.side() != 0.0 {
-            Course::Plain
+            ZeroProof::AtMostOne
         } else if value == Enclosure::WHOLE {
-            Course::Unknown
+            ZeroProof::Unbounded
         } else {
-            Course::Bent
+            ZeroProof::Unproved
         }
     }
 }

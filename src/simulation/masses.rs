@@ -106,7 +106,7 @@ impl Masses {
 }
 
 /// Eigenvalues below this fraction of the largest are taken for rounding errors of the entries.
-const LEAST_PART: f64 = 1e-14;
+const MIN_PART: f64 = 1e-14;
 
 /// Whether two numbers have different signs, and the smaller one is not negligible relative to the larger one.
 fn are_of_both((least, largest): (f64, f64), part: f64) -> bool {
@@ -120,7 +120,7 @@ fn signs_of_diagonal(masses: &[f64]) -> Option<(f64, f64)> {
     let least = masses().fold(f64::INFINITY, f64::min);
     let largest = masses().fold(f64::NEG_INFINITY, f64::max);
     let ends = (least, largest);
-    are_of_both(ends, LEAST_PART).then_some(ends)
+    are_of_both(ends, MIN_PART).then_some(ends)
 }
 
 /// The least and the largest eigenvalue of a symmetric matrix, if they have different signs beyond rounding error.
@@ -178,7 +178,7 @@ fn signs(matrix: &[f64]) -> Option<(f64, f64)> {
         true => (quotient(eigen.eigenvalues.imin()), largest),
         false => (least, quotient(eigen.eigenvalues.imax())),
     };
-    are_of_both(ends, LEAST_PART).then_some(ends)
+    are_of_both(ends, MIN_PART).then_some(ends)
 }
 
 #[cfg(test)]

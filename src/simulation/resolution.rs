@@ -20,7 +20,7 @@ pub struct Resolution<'m, M: 'm, const N: usize, L: Length<N>> {
 struct Comparisons<const N: usize, L: Length<N>> {
     choice: Choice,
     /// The end of the shorter elements in the previous element, if it was compared.
-    beside: Option<Beside<L::State>>,
+    continued: Option<StatePair<L::State>>,
     found: Found,
 }
 
@@ -90,7 +90,7 @@ pub struct Examined<'a, const N: usize, L: Length<N>> {
 
 /// The states of the shorter elements and of the run, at the same time.
 #[derive(Clone, Debug)]
-struct Beside<S> {
+struct StatePair<S> {
     state: S,
     /// The state of the run.
     run: S,
@@ -133,7 +133,7 @@ where
             return;
         }
         // Parts of such an element have lost digits of their length, or are of length zero.
-        if !(examined.h / f64::from(MOST_PARTS)).is_normal() {
+        if !(examined.h / f64::from(MAX_PARTS)).is_normal() {
             return;
         }
         if let Some(asked) = self.comparisons.asked(statistics, &examined) {
@@ -180,7 +180,7 @@ where
 
 /// The numbers of shorter elements that an element is compared with, and one that was cut.
 const PARTS: u32 = 3;
-const MOST_PARTS: u32 = 9;
+const MAX_PARTS: u32 = 9;
 
 /// A comparison that is to be made.
 #[derive(Clone, Copy)]
@@ -227,7 +227,7 @@ impl Choice {
         Asked {
             is_due: !is_quick && self.takes(is_cut, coordinates, compared),
             // If an element was too long for its solution to be verified, a third of it may be, too.
-            parts: if is_cut { MOST_PARTS } else { PARTS },
+            parts: if is_cut { MAX_PARTS } else { PARTS },
         }
     }
 
@@ -248,7 +248,7 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
     fn new(element: Element) -> Self {
         Self {
             choice: Choice::new(element),
-            beside: None,
+            continued: None,
             found: Found::default(),
         }
     }
@@ -258,7 +258,7 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
         let coordinates = L::parts(examined.before).0.as_ref().len();
         let compared = self.found.compared.len();
         let asked = self.choice.asked(statistics, coordinates, compared);
-        (asked.is_due || self.beside.is_some()).then_some(asked)
+        (asked.is_due || self.continued.is_some()).then_some(asked)
     }
 
     /// Compares an element with shorter ones if it is due. After a compared element, the shorter elements are also
@@ -270,15 +270,15 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
         advance: &mut Advance<'_, L::State>,
     ) {
         // Not after an action, which changes the state.
-        let continued = |beside: &Beside<L::State>| beside.run == *examined.before;
-        if let Some(beside) = self.beside.take().filter(continued) {
-            self.compare_from(beside.state, parts, examined, advance);
+        let continued = |continued: &StatePair<L::State>| continued.run == *examined.before;
+        if let Some(continued) = self.continued.take().filter(continued) {
+            self.compare_from(continued.state, parts, examined, advance);
         }
         if is_due {
             self.found.extend(halves::<N, L>(examined.before));
             let end = self.compare_from(examined.before.clone(), parts, examined, advance);
             let run = examined.after.clone();
-            self.beside = end.map(|state| Beside { state, run });
+            self.continued = end.map(|state| StatePair { state, run });
         }
     }
 
@@ -322,7 +322,7 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
 
 impl Found {
     /// The largest acceptable difference relative to the extent of the motion.
-    const MOST: f64 = 0.03;
+    const MAX: f64 = 0.03;
 
     /// Extends the bounds to include a state.
     fn extend(&mut self, state: Halves<'_>) {
@@ -341,7 +341,7 @@ impl Found {
         for Compared { t, h, off } in &self.compared {
             let part = extent.part(off);
             // A NaN has other warnings.
-            if !(part > Self::MOST) {
+            if !(part > Self::MAX) {
                 continue;
             }
             let (_, _, distance, count, last) = found.get_or_insert((*t, *h, part, 0, f64::NAN));
@@ -475,8 +475,8 @@ mod tests {
     #[test]
     fn differences_are_compared_with_the_motion_and_not_with_roundings() {
         let still = extent([[1.0, 1.0], [2.0, 2.0]]);
-        assert!(still.part(&[2.0 * f64::EPSILON, 0.0]) < Found::MOST);
-        assert!(still.part(&[0.0, 4.0 * f64::EPSILON]) < Found::MOST);
+        assert!(still.part(&[2.0 * f64::EPSILON, 0.0]) < Found::MAX);
+        assert!(still.part(&[0.0, 4.0 * f64::EPSILON]) < Found::MAX);
         let moving = extent([[-1.0, 1.0], [0.0, 2.0]]);
         assert!((moving.part(&[0.2, 0.0]) - 0.1).abs() < 1e-15);
         // 5e-324 weighted with 5e-324 is zero.

@@ -1,15 +1,15 @@
 //! Poincaré sections: the points where a motion crosses a surface.
 
 use super::checks::check_kinks;
-use super::course::Course;
 use super::events::Severed;
 use super::events::act::{Act, Crossing, Event, On};
 use super::follow::{Follow, Passed};
 use super::kind::{Chosen, Simulated};
 use super::pieces::{Left, Observe, Side};
 use super::sensitive::Tangents;
+use super::sequence::ElementSequence;
 use super::setup::Simulation;
-use super::steps::Way;
+use super::steps::EndlessRun;
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length, RunTimeLength};
 use nalgebra::DMatrix;
@@ -83,9 +83,9 @@ where
                 name,
                 from: t0,
                 elements: 0,
-                most: MOST_ELEMENTS,
+                most: MAX_ELEMENTS,
             },
-            way: Way::new(run.model.clone(), beginning, start, run.impulses),
+            endless: EndlessRun::new(run.model.clone(), beginning, start, run.impulses),
             crossings: Crossings {
                 tangents: None,
                 points: VecDeque::new(),
@@ -137,12 +137,12 @@ where
     chosen: Chosen,
     model: Share<'m, M>,
     search: Search,
-    way: Way<'m, M, N, L>,
+    endless: EndlessRun<'m, M, N, L>,
     crossings: Crossings<'m, M, N, L>,
 }
 
 /// The number of elements between two points of a section, unless another one is asked for.
-const MOST_ELEMENTS: usize = 10_000_000;
+const MAX_ELEMENTS: usize = 10_000_000;
 
 /// The search for the next point.
 struct Search {
@@ -191,8 +191,8 @@ where
 {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Section")
-            .field("time", &self.way.course.time())
-            .field("state", &self.way.state)
+            .field("time", &self.endless.sequence.time())
+            .field("state", &self.endless.state)
             .finish_non_exhaustive()
     }
 }
@@ -266,7 +266,7 @@ impl<M: Model<N>, const N: usize> Section<'_, M, N> {
             at_kinks,
         } = self.chosen;
         if let Err(kind) = check_kinks::<M, N>(Some(at_kinks), "linearised") {
-            self.way.course = Course::new(Err(kind));
+            self.endless.sequence = ElementSequence::new(Err(kind));
         }
         let tangents = Tangents::new(self.model.clone(), (element, control), &[]);
         self.crossings.tangents = Some(tangents);
@@ -289,11 +289,11 @@ where
                 }
                 return Some(point);
             }
-            match self.way.pass(&mut self.crossings)? {
+            match self.endless.pass(&mut self.crossings)? {
                 Ok((Left::Done, _)) if !self.crossings.points.is_empty() => {}
                 Ok((Left::Done, time)) => {
                     if let Err(kind) = self.search.count(time) {
-                        self.way.course = Course::new(Err(kind));
+                        self.endless.sequence = ElementSequence::new(Err(kind));
                     }
                 }
                 // Points before the end may still be in the queue.

@@ -1,11 +1,11 @@
 //! The endless sequence of nodes of a run.
 
-use super::course::Course;
 use super::follow::Follow;
 use super::kind::Simulated;
 use super::mesh::in_order;
 use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
 use super::resolution::{Again, Examined, Resolution};
+use super::sequence::ElementSequence;
 use super::times::Endless;
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
@@ -20,7 +20,7 @@ use tfe_runtime::Statistics;
 /// An endless iterator over the nodes of a motion, made by [`Simulation::steps`](crate::Simulation::steps). Each item
 /// is a [`Node`], or the [`RunErrorKind`] after which it ends.
 pub struct Steps<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
-    way: Way<'m, M, N, L>,
+    endless: EndlessRun<'m, M, N, L>,
     /// The velocity of the last node: the first guess for that of the next.
     velocity: L::Vector,
     /// Nodes at events that are still to be returned.
@@ -33,17 +33,17 @@ pub struct Steps<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
 impl<M, const N: usize, L: Length<N>> fmt::Debug for Steps<'_, M, N, L> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Steps")
-            .field("time", &self.way.course.time())
-            .field("state", &self.way.state)
+            .field("time", &self.endless.sequence.time())
+            .field("state", &self.endless.state)
             .finish_non_exhaustive()
     }
 }
 
 /// A stepper and its state in an endless run.
-pub(super) struct Way<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
+pub(super) struct EndlessRun<'m, M: 'm, const N: usize, L: Length<N> = FixedLength> {
     /// The model at the start.
     model: Share<'m, M>,
-    pub(super) course: Course<L::Stepper<'m, M>>,
+    pub(super) sequence: ElementSequence<L::Stepper<'m, M>>,
     pub(super) state: L::State,
     /// In the order in which the run passes them.
     impulses: Vec<L::Impulse>,
@@ -63,7 +63,7 @@ pub(super) type Beginning<'m, M, const N: usize, L> = Result<
     RunErrorKind,
 >;
 
-impl<'m, M, const N: usize, L> Way<'m, M, N, L>
+impl<'m, M, const N: usize, L> EndlessRun<'m, M, N, L>
 where
     M: Simulated<N, L>,
     L: Length<N>,
@@ -78,13 +78,13 @@ where
             let (.., h, _) = elements.element();
             impulses = in_order(&impulses, M::time_of, h.signum());
         }
-        let (way, pieces) = match beginning {
+        let (endless, pieces) = match beginning {
             Ok((stepper, elements, pieces)) => (Ok((stepper, elements)), pieces.map(Box::new)),
             Err(kind) => (Err(kind), None),
         };
         Self {
             model,
-            course: Course::new(way),
+            sequence: ElementSequence::new(endless),
             state: start,
             impulses,
             pieces,
@@ -99,28 +99,28 @@ where
     ) -> Option<Result<(Left, f64), RunErrorKind>> {
         let Self {
             model,
-            course,
+            sequence,
             state,
             impulses,
             pieces,
             ..
         } = self;
         let Some(pieces) = pieces.as_mut() else {
-            return course.failure().map(Err);
+            return sequence.failure().map(Err);
         };
         pieces.events.met.clear();
-        let Some((stepper, leg)) = course.begin() else {
-            return course.failure().map(Err);
+        let Some((stepper, element)) = sequence.begin() else {
+            return sequence.failure().map(Err);
         };
-        let (t, next) = leg.nodes;
-        pieces.model().kick(impulses, (t, leg.h), state);
-        let impulses = M::acting(impulses, leg.nodes);
+        let (t, next) = element.nodes;
+        pieces.model().kick(impulses, (t, element.h), state);
+        let impulses = M::acting(impulses, element.nodes);
         let planned = Planned {
-            number: leg.number,
+            number: element.number,
             t,
             next,
-            h: leg.h,
-            begin: leg.begin,
+            h: element.h,
+            begin: element.begin,
             impulses: &impulses,
         };
         let left = model.guarded(|| pieces.pass(stepper, planned, state, observer));
@@ -135,14 +135,14 @@ where
 
     /// Goes on to the next element, or ends the sequence.
     fn end(&mut self, goes_on: bool) {
-        if !goes_on && let Some(stepper) = self.course.stepper() {
+        if !goes_on && let Some(stepper) = self.sequence.stepper() {
             self.statistics = *M::statistics(stepper);
         }
-        self.course.end(goes_on);
+        self.sequence.end(goes_on);
     }
 
     pub(super) fn statistics(&self) -> Statistics {
-        match self.course.stepper() {
+        match self.sequence.stepper() {
             Some(stepper) => *M::statistics(stepper),
             None => self.statistics,
         }
@@ -164,16 +164,16 @@ where
         let mut watch = Watch::new(again.chosen.element);
         let (q, _) = L::parts(&start);
         let mut velocity = L::zero(q);
-        let mut way = Way::new(model, beginning, start, impulses);
-        let (model, state) = (&way.model, &way.state);
-        if let Some(stepper) = way.course.stepper_mut() {
+        let mut endless = EndlessRun::new(model, beginning, start, impulses);
+        let (model, state) = (&endless.model, &endless.state);
+        if let Some(stepper) = endless.sequence.stepper_mut() {
             let node = M::node(stepper, model, (t0, state), &velocity);
             watch.pass(Recorded::of(&**model, &node, false), &|| 0.0);
             watch.add(model.weigh(&node));
             velocity = node.v;
         }
         Self {
-            way,
+            endless,
             velocity,
             nodes: VecDeque::new(),
             rows: Rows::default(),
@@ -186,21 +186,21 @@ where
     /// gives for a run. If events are looked for, jumps of the energy and unstable step sizes are not checked.
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = self.watch.warnings().to_vec();
-        warnings.extend(self.resolution.warning(&self.way.state));
+        warnings.extend(self.resolution.warning(&self.endless.state));
         warnings
     }
 
     /// The model with the parameters set by events so far.
     pub(super) fn model(&self) -> &M {
-        match &self.way.pieces {
+        match &self.endless.pieces {
             Some(pieces) => pieces.model(),
-            None => &self.way.model,
+            None => &self.endless.model,
         }
     }
 
     /// The inputs of the model have other values from the next step on.
     pub(super) fn set_inputs(&mut self) {
-        if let Some(pieces) = &mut self.way.pieces {
+        if let Some(pieces) = &mut self.endless.pieces {
             pieces.events.forget_bounds();
         }
     }
@@ -216,55 +216,55 @@ where
 
     /// Writes the outputs at the node returned last, with the model and the inputs of that time.
     pub(super) fn outputs(&self, last: &Node<N, L>, values: &mut [f64]) {
-        match &self.way.pieces {
+        match &self.endless.pieces {
             Some(_) => values.copy_from_slice(&self.rows.row),
-            None => write_outputs(&*self.way.model, last, values),
+            None => write_outputs(&*self.endless.model, last, values),
         }
     }
 
     /// The node at which the next step begins, unless the run has ended.
     pub(super) fn node(&self) -> Option<Node<N, L>> {
-        let t = self.way.course.time()?;
-        Some(Node::of(t, &self.way.state, self.velocity.clone()))
+        let t = self.endless.sequence.time()?;
+        Some(Node::of(t, &self.endless.state, self.velocity.clone()))
     }
 
     /// Counts of iterations, evaluations and factorisations of the steps so far.
     pub fn statistics(&self) -> Statistics {
-        self.way.statistics()
+        self.endless.statistics()
     }
 
     /// The [events](crate::Simulation::on) in the step that led to the node returned last, in order of time. If a step
     /// has several nodes because events changed the state, the events are given with the first of these nodes.
     pub fn events(&self) -> &[Event<N, L>] {
-        (self.way.pieces.as_ref()).map_or(&[], |pieces| &pieces.events.met)
+        (self.endless.pieces.as_ref()).map_or(&[], |pieces| &pieces.events.met)
     }
 
     /// Solves a step in which no events are looked for; `None` if the sequence has ended.
     fn pass_whole(&mut self) -> Option<Result<Node<N, L>, RunErrorKind>> {
-        let Way {
+        let EndlessRun {
             model,
-            course,
+            sequence,
             state,
             impulses,
             ..
-        } = &mut self.way;
-        let (stepper, leg) = course.begin()?;
-        let ((t, next), at) = (leg.nodes, (leg.nodes.0, leg.h));
+        } = &mut self.endless;
+        let (stepper, element) = sequence.begin()?;
+        let ((t, next), at) = (element.nodes, (element.nodes.0, element.h));
         let is_kicked = model.kick(impulses, at, state);
-        let impulses = M::acting(impulses, leg.nodes);
+        let impulses = M::acting(impulses, element.nodes);
         let has_impulses = is_kicked || !impulses.is_empty();
         let before = state.clone();
-        model.look(&mut self.watch, leg.number, at, &before, false);
+        model.look(&mut self.watch, element.number, at, &before, false);
         let velocity = &mut self.velocity;
         let passed = model.guarded(|| {
-            M::advance(stepper, (leg.begin, leg.h), state, &impulses)?;
+            M::advance(stepper, (element.begin, element.h), state, &impulses)?;
             Ok(M::node(stepper, model, (next, state), velocity))
         });
         let node = match passed {
             Some(Ok(node)) => node,
             Some(Err(source)) => {
-                model.look(&mut self.watch, leg.number, at, &before, true);
-                return Some(Err(model.failed(leg.number, at, source)));
+                model.look(&mut self.watch, element.number, at, &before, true);
+                return Some(Err(model.failed(element.number, at, source)));
             }
             None => return Some(Err(RunErrorKind::panicked(t))),
         };
@@ -272,8 +272,8 @@ where
         if !has_impulses {
             let examined = Examined {
                 t,
-                begin: leg.begin,
-                h: leg.h,
+                begin: element.begin,
+                h: element.h,
                 before: &before,
                 after: state,
             };
@@ -295,20 +295,20 @@ where
             watch: &mut self.watch,
             resolution: &mut self.resolution,
         };
-        match self.way.pass(&mut observer) {
+        match self.endless.pass(&mut observer) {
             None | Some(Ok((Left::Stopped, _))) => {}
             Some(Err(kind)) => self.nodes.push_back(Err(kind)),
             Some(Ok((Left::Done, next))) => {
-                let Way {
-                    course,
+                let EndlessRun {
+                    sequence,
                     pieces,
                     state,
                     model,
                     ..
-                } = &mut self.way;
+                } = &mut self.endless;
                 let model = pieces.as_ref().map_or(&**model, |pieces| &**pieces.model());
                 if observer.last != next
-                    && let Some(stepper) = course.stepper_mut()
+                    && let Some(stepper) = sequence.stepper_mut()
                 {
                     observer.push(stepper, model, (next, state));
                 }
@@ -325,7 +325,7 @@ where
     type Item = Result<Node<N, L>, RunErrorKind>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        if self.way.pieces.is_some() {
+        if self.endless.pieces.is_some() {
             if self.nodes.is_empty() {
                 self.look();
             }
@@ -337,10 +337,10 @@ where
         }
         match self.pass_whole() {
             Some(passed) => {
-                self.way.end(passed.is_ok());
+                self.endless.end(passed.is_ok());
                 Some(passed)
             }
-            None => self.way.course.failure().map(Err),
+            None => self.endless.sequence.failure().map(Err),
         }
     }
 }

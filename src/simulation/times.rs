@@ -2,8 +2,8 @@
 
 use crate::error::RunErrorKind;
 use crate::motion::{
-    LEAST_ROUNDINGS, MOST_STEPS, breaks_within, count_steps, direction_of, is_same_time,
-    leads_to_end, sort_times,
+    MAX_STEPS, MIN_ROUNDINGS, breaks_within, count_steps, direction_of, is_same_time, leads_to_end,
+    sort_times,
 };
 use std::ops::Range;
 use tfe_runtime::{Element, Family, Rule};
@@ -405,7 +405,7 @@ fn check_nodes(span: &Range<f64>, nodes: &[f64], direction: f64) -> Result<(), R
 
 /// Refuses steps of a few ulps of the time: nodes, or points of an element, would coincide.
 fn check_resolution(time: f64, step: f64) -> Result<(), RunErrorKind> {
-    let least = LEAST_ROUNDINGS * f64::EPSILON * time.abs();
+    let least = MIN_ROUNDINGS * f64::EPSILON * time.abs();
     if step.abs() < least {
         return Err(RunErrorKind::StepUnresolved { time, step, least });
     }
@@ -442,7 +442,7 @@ fn single_steps(nodes: &[f64]) -> Vec<Segment> {
 impl Segment {
     fn new(start: f64, end: f64, step: f64) -> Result<Self, RunErrorKind> {
         let ratio = (end - start) / step;
-        if !(ratio <= MOST_STEPS) {
+        if !(ratio <= MAX_STEPS) {
             return Err(RunErrorKind::TooManySteps {
                 span: end - start,
                 step,

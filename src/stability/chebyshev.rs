@@ -172,7 +172,7 @@ pub(crate) fn bracketed_root<E>(
     let ((mut a, mut fa), (mut b, mut fb)) = (start, end);
     let (mut c, mut fc) = (a, fa);
     let (mut step, mut before) = (b - a, b - a);
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         if (fb > 0.0) == (fc > 0.0) && fc != 0.0 {
             (c, fc) = (a, fa);
             step = b - a;
@@ -219,7 +219,7 @@ pub(crate) fn bracketed_root<E>(
 }
 
 /// Limit of the steps. Brent's method usually needs about a dozen; in the worst case it could need about a thousand.
-const MOST_STEPS: usize = 200;
+const MAX_STEPS: usize = 200;
 
 #[cfg(test)]
 mod tests {

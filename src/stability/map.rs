@@ -161,10 +161,10 @@ impl MapPlan {
     }
 
     fn check(&self) -> Result<(), MapError> {
-        const MOST_CELLS: usize = 1 << 28;
+        const MAX_CELLS: usize = 1 << 28;
         let (columns, rows) = (self.columns, self.rows);
         let cells = columns.checked_mul(rows);
-        if !cells.is_some_and(|cells| (1..=MOST_CELLS).contains(&cells)) {
+        if !cells.is_some_and(|cells| (1..=MAX_CELLS).contains(&cells)) {
             return Err(MapError::Resolution { columns, rows });
         }
         for (label, range) in self.labels.iter().zip([&self.x, &self.y]) {

@@ -1,7 +1,7 @@
 //! The mesh of one run.
 
 use super::error::WorkPrecisionError;
-use crate::motion::{MOST_STEPS, count_steps};
+use crate::motion::{MAX_STEPS, count_steps};
 use std::ops::Range;
 
 /// A span divided into equal steps; the last one may be shorter.
@@ -41,7 +41,7 @@ impl Grid {
             return Err(WorkPrecisionError::Step { step });
         }
         let ratio = (end - start).abs() / step.abs();
-        if !(ratio <= MOST_STEPS) {
+        if !(ratio <= MAX_STEPS) {
             return Err(WorkPrecisionError::TooManySteps {
                 span: end - start,
                 step,

@@ -14,7 +14,7 @@ use tfe_runtime::Element;
 use tfe_runtime::step::Control;
 
 /// The largest number of repetitions of a run: the best of a hundred is close to the best of a thousand.
-const MOST_REPETITIONS: u32 = 100;
+const MAX_REPETITIONS: u32 = 100;
 
 /// The data common to all runs.
 pub(super) struct Measure<'a, M, S> {
@@ -25,20 +25,20 @@ pub(super) struct Measure<'a, M, S> {
 
 /// The element, the control and the mesh of one run.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Way<'g> {
+pub(crate) struct Discretisation<'g> {
     pub(crate) element: Element,
     pub(crate) control: Control,
     pub(crate) grid: &'g Grid,
 }
 
 impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
-    fn stepper(&self, way: Way<'_>) -> Result<M::Stepper<'_>, RunErrorKind> {
-        self.model.stepper(way.element, way.control)
+    fn stepper(&self, scheme: Discretisation<'_>) -> Result<M::Stepper<'_>, RunErrorKind> {
+        self.model.stepper(scheme.element, scheme.control)
     }
 
     /// Makes a run and examines it; the clock is stopped meanwhile.
-    pub(super) fn look(&self, way: Way<'_>) -> Result<Measured, RunErrorKind> {
-        let (grid, mut stepper) = (way.grid, self.stepper(way)?);
+    pub(super) fn look(&self, scheme: Discretisation<'_>) -> Result<Measured, RunErrorKind> {
+        let (grid, mut stepper) = (scheme.grid, self.stepper(scheme)?);
         let mut observer = Observer::new(self, &mut stepper, grid.node(0));
         let (mut state, mut from, mut time) = (self.start.clone(), 0, Duration::ZERO);
         for look in grid.looks() {
@@ -55,29 +55,34 @@ impl<M: Subject<S>, S: PhasePoint> Measure<'_, M, S> {
     }
 
     /// Makes a run without examining it.
-    pub(super) fn time(&self, way: Way<'_>) -> Result<Duration, RunErrorKind> {
-        let (grid, mut state) = (way.grid, self.start.clone());
-        advance::<M, S>(&mut self.stepper(way)?, grid, 0..grid.steps(), &mut state)
+    pub(super) fn time(&self, scheme: Discretisation<'_>) -> Result<Duration, RunErrorKind> {
+        let (grid, mut state) = (scheme.grid, self.start.clone());
+        advance::<M, S>(
+            &mut self.stepper(scheme)?,
+            grid,
+            0..grid.steps(),
+            &mut state,
+        )
     }
 
     /// Makes the run with each tolerance, the smallest first, and returns the one with the largest tolerance that does
     /// not increase the error noticeably.
     pub(super) fn look_with(
         &self,
-        way: Way<'_>,
+        scheme: Discretisation<'_>,
         tolerances: &[f64],
     ) -> (f64, Result<Measured, RunErrorKind>) {
         let with = |tolerance| {
             let control = Control {
                 tolerance,
-                ..way.control
+                ..scheme.control
             };
-            (tolerance, self.look(Way { control, ..way }))
+            (tolerance, self.look(Discretisation { control, ..scheme }))
         };
         let mut sorted = tolerances.to_vec();
         sorted.sort_by(f64::total_cmp);
         let Some((tightest, mut looser)) = sorted.split_first() else {
-            return with(way.control.tolerance);
+            return with(scheme.control.tolerance);
         };
         let mut best = with(*tightest);
         while best.1.is_err()
@@ -118,7 +123,7 @@ pub(crate) struct Best<'a> {
 impl Best<'_> {
     /// Repeats the run until it has taken the time `until` in total, or fails.
     pub(crate) fn repeat(self, until: Duration, mut run: impl FnMut() -> Option<Duration>) {
-        while *self.spent < until && *self.repetitions < MOST_REPETITIONS {
+        while *self.spent < until && *self.repetitions < MAX_REPETITIONS {
             let Some(time) = run() else {
                 break;
             };

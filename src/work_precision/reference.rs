@@ -282,10 +282,10 @@ impl Halving {
         /// yet.
         const RESOLVED: f64 = 1e-6;
         /// The largest number of halvings. If this is not enough, the longest steps are too long to be compared.
-        const MOST_HALVINGS: u32 = 24;
+        const MAX_HALVINGS: u32 = 24;
         let (mut last, mut failure) = (None, None);
         let mut best: Option<Settled<T>> = None;
-        for halvings in 0..MOST_HALVINGS {
+        for halvings in 0..MAX_HALVINGS {
             let step = self.longest * 0.5_f64.powi(halvings as i32);
             if step < self.least {
                 break;

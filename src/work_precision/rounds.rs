@@ -3,7 +3,7 @@
 //! The speed of a processor varies with time. If runs are repeated in turn, no run has all its repetitions in a slow
 //! period.
 
-use super::measure::{Best, Measure, Way};
+use super::measure::{Best, Discretisation, Measure};
 use super::peer::{Peer, Rival};
 use super::point::Point;
 use super::reference::Known;
@@ -17,7 +17,7 @@ pub(crate) const ROUNDS: u32 = 4;
 /// A point of a curve, whose run can be repeated.
 pub(super) struct Timed<'g> {
     pub(super) point: Point,
-    way: Way<'g>,
+    scheme: Discretisation<'g>,
     spent: Duration,
 }
 
@@ -25,21 +25,21 @@ impl<'g> Timed<'g> {
     /// Makes the first run.
     pub(super) fn look<M: Subject<S>, S: PhasePoint>(
         measure: &Measure<'_, M, S>,
-        way: Way<'g>,
+        scheme: Discretisation<'g>,
         tolerances: &[f64],
     ) -> Self {
-        let (tolerance, outcome) = measure.look_with(way, tolerances);
-        let Way {
+        let (tolerance, outcome) = measure.look_with(scheme, tolerances);
+        let Discretisation {
             element,
             control,
             grid,
-        } = way;
-        let way = Way {
+        } = scheme;
+        let scheme = Discretisation {
             control: Control {
                 tolerance,
                 ..control
             },
-            ..way
+            ..scheme
         };
         let seconds = outcome.as_ref().map_or(0.0, |one| one.seconds);
         Self {
@@ -50,7 +50,7 @@ impl<'g> Timed<'g> {
                 tolerance,
                 outcome,
             },
-            way,
+            scheme,
             spent: Duration::try_from_secs_f64(seconds).unwrap_or_default(),
         }
     }
@@ -70,7 +70,7 @@ impl<'g> Timed<'g> {
             spent: &mut self.spent,
         };
         // The same run succeeded before.
-        best.repeat(until, || measure.time(self.way).ok());
+        best.repeat(until, || measure.time(self.scheme).ok());
     }
 }
 

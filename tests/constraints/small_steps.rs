@@ -273,7 +273,7 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
     const SHORT: [&str; 2] = ["top", "blade"];
     const THRICE: [&str; 6] = ["rod", "bead", "moving wire", "ground", "plate", "fast rod"];
     /// A run that was nearly accurate enough is repeated.
-    const MOST: f64 = 4.0;
+    const MAX: f64 = 4.0;
     struct Work {
         /// The number of estimates within a factor of two, and of all.
         sharp: Cell<(u32, u32)>,
@@ -324,7 +324,7 @@ fn accuracies_take_a_few_times_the_best_by_hand() {
                 worst = larger(worst, ratio);
                 self.good.set(self.good.get() + u32::from(ratio <= 3.0));
             }
-            let most = if is_thrice { 3.0 } else { MOST };
+            let most = if is_thrice { 3.0 } else { MAX };
             assert!(worst <= most || SHORT.contains(&name), "{name}: {worst}");
         }
     }

@@ -26,13 +26,13 @@ pub(crate) fn are_parameters<M: Model<N>, const N: usize>(
     directions: &[Direction],
 ) -> bool {
     /// With fewer directions, dual numbers are cheaper.
-    const LEAST: usize = 4;
+    const MIN: usize = 4;
     let is_one = |direction: &Direction| {
         let moves = [direction.time, direction.length, direction.damping] != [0.0; 3];
         let index = direction.parameter.and_then(|one| one.any(model));
         !moves && index.is_some_and(|index| index < model.parameters())
     };
-    M::CONSTRAINTS.is_empty() && directions.len() >= LEAST && directions.iter().all(is_one)
+    M::CONSTRAINTS.is_empty() && directions.len() >= MIN && directions.iter().all(is_one)
 }
 
 /// The adjoint of elements: the accumulated derivatives by all parameters, and the memory that their computation needs.

@@ -14,7 +14,7 @@ pub const MAX_RATES: usize = MAX_NODES - 1;
 
 /// An upper bound of |∫₀^τ P_k(2σ − 1) dσ|: 1/(2k + 1), because |P_{k+1} − P_{k−1}| ≤ 2.
 #[cfg(feature = "alloc")]
-pub(crate) const MOST_OF_INTEGRALS: [f64; MAX_NODES] = {
+pub(crate) const INTEGRAL_BOUNDS: [f64; MAX_NODES] = {
     let mut most = [1.0; MAX_NODES];
     let mut k = 1;
     while k < MAX_NODES {

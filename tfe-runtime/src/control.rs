@@ -49,12 +49,12 @@ pub struct Control {
 
 /// An upper bound of the tolerance for models with constraints: a larger violation would make the end of an element an
 /// inadmissible start of the next one.
-const MOST_WITH_CONSTRAINTS: f64 = 0.1 * START_TOLERANCE;
+const MAX_WITH_CONSTRAINTS: f64 = 0.1 * START_TOLERANCE;
 
 impl Control {
     pub(crate) fn with_constraints(self) -> Self {
         Self {
-            tolerance: self.tolerance.min(MOST_WITH_CONSTRAINTS),
+            tolerance: self.tolerance.min(MAX_WITH_CONSTRAINTS),
             ..self
         }
     }

@@ -349,10 +349,10 @@ pub(crate) fn conjugate<M, const N: usize>(
 where
     M: Model<N>,
 {
-    const MOST: u32 = 60;
+    const MAX: u32 = 60;
     let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
     let mut search = Search::new(guess, target);
-    for iteration in 0..MOST {
+    for iteration in 0..MAX {
         model.first_and_mass(t, q, &search.z, &mut first, &mut zz);
         // For a quadratic function one iteration suffices; a second one removes the rounding error of a long first one.
         let enough = match (M::FACTS.quadratic_in_z, iteration) {
@@ -377,7 +377,7 @@ where
         }
     }
     Err(LegendreError::Stalled {
-        iterations: MOST,
+        iterations: MAX,
         residual: search.residual,
     })
 }

@@ -41,7 +41,7 @@ use crate::error::StepError;
 use crate::lanes::Lanes;
 use crate::method::{cold_rate, cold_rates, may_be_phase};
 use crate::model::{First, Model, State};
-use crate::registers::four::{Apart, Four};
+use crate::registers::four::{Four, OutOfLine};
 use crate::registers::storage::{Fixed, Keep, List, Row, Storage};
 use crate::scheme::{SchemeRef, Tables};
 use crate::unlike::Declarations;
@@ -96,7 +96,7 @@ struct Work<const N: usize, S: Storage> {
 }
 
 /// The input of one step: its start, length and time.
-struct Leg<'a, const N: usize, S: Storage> {
+struct StepInput<'a, const N: usize, S: Storage> {
     t: f64,
     h: f64,
     start: &'a State<N>,
@@ -248,7 +248,7 @@ impl<const N: usize, S: Storage> Points<N, S> {
         #[cfg(all(feature = "simd", target_arch = "x86_64"))]
         if let Some(isa) = self.isa {
             let like = crate::registers::quad::Quad::of(isa, [0.0; 4]);
-            return like.apart(Velocities::<M, S, N>::of(self, rates));
+            return like.out_of_line(Velocities::<M, S, N>::of(self, rates));
         }
         Velocities::<M, S, N>::of(self, rates).run(Lanes([0.0; 4]));
     }
@@ -282,7 +282,7 @@ impl<'a, M, S: Storage, const N: usize> Velocities<'a, M, S, N> {
     }
 }
 
-impl<M: Model<N>, S: Storage, const N: usize> Apart for Velocities<'_, M, S, N> {
+impl<M: Model<N>, S: Storage, const N: usize> OutOfLine for Velocities<'_, M, S, N> {
     #[inline(always)]
     fn run<V: Four>(self, like: V) {
         let Self { points, rates, .. } = self;
@@ -397,12 +397,12 @@ where
 }
 
 /// What sizes are at least, so that changes of zero are zero relative to them.
-const LEAST: f64 = f64::MIN_POSITIVE;
+const MIN_SIZE: f64 = f64::MIN_POSITIVE;
 
-/// The largest magnitude, or [`LEAST`].
+/// The largest magnitude, or [`MIN_SIZE`].
 #[inline(always)]
 fn largest<const N: usize>(numbers: &[f64; N]) -> f64 {
-    let mut largest = LEAST;
+    let mut largest = MIN_SIZE;
     for a in 0..N {
         let size = numbers[a].abs();
         largest = if largest < size { size } else { largest };

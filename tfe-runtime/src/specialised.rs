@@ -22,7 +22,7 @@ const IS_LARGE: bool = cfg!(feature = "alloc");
 
 /// With at most this many registers of unknowns, the memory of a step is made anew in each step; larger memory is kept,
 /// as it does not fit into registers anyway.
-const MOST_IN_REGISTERS: usize = 8;
+const MAX_IN_REGISTERS: usize = 8;
 
 /// The sizes of [`Inline`](crate::registers::storage::Inline) for a model and an element; zeros where steps evaluate
 /// one point after the other.
@@ -42,7 +42,7 @@ where
         (groups, 0)
     };
     // Matrices for several registers of points are in memory in any case.
-    let is_much = N * groups > MOST_IN_REGISTERS || !M::FACTS.constant_mass && groups > 1;
+    let is_much = N * groups > MAX_IN_REGISTERS || !M::FACTS.constant_mass && groups > 1;
     let kept = if is_much { 1 } else { 0 };
     let projected = if is_projected::<M, N>(&element) { 1 } else { 0 };
     [points, groups, first, varying, square, kept, projected]

@@ -4,11 +4,11 @@
 use super::super::estimated::Attempt;
 use super::super::grading::Grading;
 use super::super::pilot::corners;
-use super::runs::{Asked, MOST_TIMES, STEPS_BETWEEN, Way};
+use super::runs::{Asked, MAX_TIMES, RunSettings, STEPS_BETWEEN};
 use crate::numbers::larger;
 use std::ops::Range;
 
-impl Way<'_> {
+impl RunSettings<'_> {
     /// The length of the span and the longest step, in the measure of steps.
     pub(super) fn lengths(&self, asked: &Asked) -> (f64, f64) {
         let length = self.between(asked.span.start, asked.span.end);
@@ -79,7 +79,7 @@ impl Way<'_> {
     }
 }
 
-/// The step size to ask for such that steps of the length [taken](Way::taken) are taken again: if it were shorter by a
+/// The step size to ask for such that steps of the length [taken](RunSettings::taken) are taken again: if it were shorter by a
 /// rounding error, parts would have one step more.
 pub(super) fn again(taken: f64) -> f64 {
     taken * (1.0 + 4.0 * f64::EPSILON)
@@ -96,7 +96,7 @@ pub(super) fn cuts(asked: &Asked, grading: Option<&Grading>, step: f64) -> Vec<f
 /// The same with a grading: well separated both in time and in steps. Fast phases in between affect the later states.
 fn graded_cuts(asked: &Asked, grading: &Grading, step: f64) -> Vec<f64> {
     let Range { start, end } = asked.span;
-    let apart = (end - start).abs() / MOST_TIMES;
+    let differences = (end - start).abs() / MAX_TIMES;
     let mut cuts = vec![start];
     let mut from = start;
     for to in corners(&asked.span, &asked.breaks) {
@@ -105,7 +105,7 @@ fn graded_cuts(asked: &Asked, grading: &Grading, step: f64) -> Vec<f64> {
         let mut before = from;
         for k in 1..parts as usize {
             let t = grading.time(first + (last - first) * (k as f64 / parts));
-            if (t - before).abs() >= apart && (to - t).abs() >= apart {
+            if (t - before).abs() >= differences && (to - t).abs() >= differences {
                 cuts.push(t);
                 before = t;
             }
@@ -119,7 +119,7 @@ fn graded_cuts(asked: &Asked, grading: &Grading, step: f64) -> Vec<f64> {
 fn even_cuts(asked: &Asked, step: f64) -> Vec<f64> {
     let Range { start, end } = asked.span;
     let length = (end - start).abs();
-    let times = (length / (STEPS_BETWEEN * step)).clamp(1.0, MOST_TIMES);
+    let times = (length / (STEPS_BETWEEN * step)).clamp(1.0, MAX_TIMES);
     let mut cuts = vec![start];
     let mut from = start;
     for to in corners(&asked.span, &asked.breaks) {

@@ -3,8 +3,8 @@
 use super::super::estimated::Attempt;
 use super::super::trace::difference;
 use super::runs::{
-    AIM, COARSER, HIGH, LEAST_FACTOR, LEFT, LONGER, LONGER_MEASURED, MOST_FACTOR, MOST_GAIN,
-    MOST_GAIN_MEASURED, MOST_UNRESOLVED, RESOLVED, ROUNDINGS, Ran, SAME, largest,
+    AIM, COARSER, HIGH, LEFT, LONGER, LONGER_MEASURED, MAX_FACTOR, MAX_GAIN, MAX_GAIN_MEASURED,
+    MAX_UNRESOLVED, MIN_FACTOR, RESOLVED, ROUNDINGS, Ran, SAME, largest,
 };
 use tfe_runtime::Element;
 
@@ -19,7 +19,7 @@ pub(super) struct Ladder {
     /// The last step and its run.
     pub(super) last: Option<(f64, Ran)>,
     /// The difference between the last two runs.
-    pub(super) apart: Option<f64>,
+    pub(super) differences: Option<f64>,
     /// The error estimate of the last run, and whether it meets the accuracy.
     pub(super) errors: Option<(Vec<Vec<f64>>, bool)>,
     /// The number of successive comparisons without a meaningful result.
@@ -48,7 +48,7 @@ impl Ladder {
             accuracy,
             attempts: Vec::new(),
             last: None,
-            apart: None,
+            differences: None,
             errors: None,
             unresolved: 0,
         }
@@ -59,7 +59,7 @@ impl Ladder {
             step,
             error_estimate: None,
         });
-        (self.last, self.apart) = (None, None);
+        (self.last, self.differences) = (None, None);
     }
 
     /// Compares a run with the previous one.
@@ -78,37 +78,37 @@ impl Ladder {
             return Verdict::Enough;
         };
         let mut errors = difference(&before.trace, &ran.trace);
-        let apart = largest(&errors);
+        let differences = largest(&errors);
         let contracts = before.contracts && ran.contracts;
         // The difference is the error of the previous run; together with that of the run before, it gives the order of
         // convergence.
         let ratio = longer / step;
-        let power = match (self.apart, self.attempts.iter().rev().nth(1)) {
+        let power = match (self.differences, self.attempts.iter().rev().nth(1)) {
             (Some(earlier), Some(first)) if earlier <= RESOLVED => {
-                let power = (earlier / apart).ln() / (first.step / longer).ln();
+                let power = (earlier / differences).ln() / (first.step / longer).ln();
                 Some(power).filter(|power| power.is_finite())
             }
             _ => None,
         };
         if let Some(attempt) = self.attempts.last_mut() {
-            attempt.error_estimate = Some(apart);
+            attempt.error_estimate = Some(differences);
         }
-        let at_floor = power.is_some_and(|power| power < 1.0) && apart < ROUNDINGS;
+        let at_floor = power.is_some_and(|power| power < 1.0) && differences < ROUNDINGS;
         let order = if contracts { self.order } else { self.reduced };
         let is_reduced = order < self.order;
         let (longer, most_gain) = if is_reduced {
-            (LONGER, MOST_GAIN_MEASURED)
+            (LONGER, MAX_GAIN_MEASURED)
         } else if power.is_some() {
-            (LONGER_MEASURED, MOST_GAIN_MEASURED)
+            (LONGER_MEASURED, MAX_GAIN_MEASURED)
         } else {
-            (LONGER, MOST_GAIN)
+            (LONGER, MAX_GAIN)
         };
         // If the order was not measured, that of the element is used, which is only reliable where the fixed-point
         // iteration converges.
         let power = power.map(|power| power.clamp(1.0, order));
         let known = (power.is_some() || contracts) && ratio > SAME;
         let power = power.unwrap_or(order);
-        let gain = if apart <= RESOLVED && ratio > SAME {
+        let gain = if differences <= RESOLVED && ratio > SAME {
             (ratio.powf(power) - 1.0).min(most_gain)
         } else {
             1.0
@@ -117,29 +117,29 @@ impl Ladder {
         for error in errors.iter_mut().flatten() {
             *error = *error / gain + left;
         }
-        let error = apart / gain;
+        let error = differences / gain;
         attempt.error_estimate = Some(error + left);
         self.attempts.push(attempt);
-        self.apart = Some(apart);
+        self.differences = Some(differences);
         let margin = longer.powf(power);
-        let is_met = known && apart <= RESOLVED && error * margin <= self.accuracy - left;
+        let is_met = known && differences <= RESOLVED && error * margin <= self.accuracy - left;
         self.errors = Some((errors, is_met));
-        self.unresolved = if apart <= RESOLVED {
+        self.unresolved = if differences <= RESOLVED {
             0
         } else {
             self.unresolved + 1
         };
-        if is_met || self.unresolved == MOST_UNRESOLVED {
+        if is_met || self.unresolved == MAX_UNRESOLVED {
             return Verdict::Enough;
         }
         if at_floor {
             return Verdict::Floor;
         }
-        let factor = if apart <= RESOLVED {
+        let factor = if differences <= RESOLVED {
             (self.accuracy / error).powf(1.0 / power) / AIM
         } else {
             0.0
         };
-        Verdict::Shorter(step * factor.clamp(LEAST_FACTOR, MOST_FACTOR))
+        Verdict::Shorter(step * factor.clamp(MIN_FACTOR, MAX_FACTOR))
     }
 }

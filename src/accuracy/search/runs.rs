@@ -54,7 +54,7 @@ pub(crate) struct Graded {
 
 /// The settings of one run.
 #[derive(Clone, Debug)]
-pub(crate) struct Way<'a> {
+pub(crate) struct RunSettings<'a> {
     pub(crate) element: Element,
     pub(crate) tolerance: f64,
     /// Whether only the fixed-point iteration is used, so that a step without convergence fails.
@@ -83,31 +83,31 @@ pub(crate) type Pilot<'r> = dyn FnMut(f64) -> Option<Graded> + 'r;
 /// Makes the runs of a search.
 pub(crate) trait Runner {
     /// Makes one run.
-    fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed>;
+    fn run(&mut self, settings: &RunSettings<'_>) -> Result<Ran, Failed>;
     /// Makes a recorded run, and beside it another one over the same steps, until `observer` ends both.
-    fn run_beside(
+    fn run_pair(
         &mut self,
-        way: &Way<'_>,
-        better: &Way<'_>,
+        settings: &RunSettings<'_>,
+        better: &RunSettings<'_>,
         observer: &mut PairObserver<'_>,
-    ) -> Result<RanBeside, Failed>;
+    ) -> Result<PairRun, Failed>;
 }
 
 /// Called at every node that both runs have reached; the result says whether they continue.
-pub(crate) type PairObserver<'j> = dyn FnMut(&Beside<'_>) -> ControlFlow<()> + 'j;
+pub(crate) type PairObserver<'j> = dyn FnMut(&PairComparison<'_>) -> ControlFlow<()> + 'j;
 
 /// The comparison of two runs at a node.
-pub(crate) struct Beside<'a> {
+pub(crate) struct PairComparison<'a> {
     pub(crate) time: f64,
     /// The largest difference of each kind.
-    pub(crate) apart: &'a [f64],
+    pub(crate) differences: &'a [f64],
     /// The largest magnitude of each kind so far.
     pub(crate) sizes: &'a [f64],
 }
 
 /// The result of two runs.
 #[derive(Clone, Debug)]
-pub(crate) struct RanBeside {
+pub(crate) struct PairRun {
     pub(crate) traces: [Trace; 2],
     /// The times of the nodes.
     pub(crate) times: Vec<f64>,
@@ -172,18 +172,18 @@ pub(super) const COARSER: f64 = 1.5;
 pub(super) const RESOLVED: f64 = 0.1;
 /// The number of meaningless comparisons after which the search ends. Steps have become a hundred times shorter by
 /// then, and their local errors smaller than rounding errors: the motion is chaotic.
-pub(super) const MOST_UNRESOLVED: u32 = 5;
+pub(super) const MAX_UNRESOLVED: u32 = 5;
 /// The largest number of runs over the whole span.
-pub(super) const MOST_RUNS: usize = 14;
+pub(super) const MAX_RUNS: usize = 14;
 /// The largest number of steps of a run. The nodes of more would take gigabytes, and a search that asks for them has
 /// errors that do not decrease with the order of its element.
-pub(super) const MOST_STEPS: f64 = 1e7;
+pub(super) const MAX_STEPS: f64 = 1e7;
 /// The number of steps between two times of comparison; large enough that the step size can be chosen finely.
 pub(super) const STEPS_BETWEEN: f64 = 12.0;
-pub(super) const MOST_TIMES: f64 = 64.0;
+pub(super) const MAX_TIMES: f64 = 64.0;
 /// The limits of the factor between successive step sizes.
-pub(super) const LEAST_FACTOR: f64 = 0.4;
-pub(super) const MOST_FACTOR: f64 = 0.87;
+pub(super) const MIN_FACTOR: f64 = 0.4;
+pub(super) const MAX_FACTOR: f64 = 0.87;
 /// The first step that is tried is the span divided by this.
 pub(super) const FIRST: f64 = 8.0;
 /// If the run will have more steps than this, another probe is cheap.
@@ -191,10 +191,10 @@ pub(super) const MANY_TO_PROBE: f64 = 24.0;
 /// Orders above this are high.
 pub(super) const HIGH: f64 = 10.0;
 /// The largest factor by which the error is assumed to decrease from one run to the next.
-pub(super) const MOST_GAIN: f64 = 150.0;
+pub(super) const MAX_GAIN: f64 = 150.0;
 /// The same if the iterations of both runs have about the same tolerance: their errors may have been amplified, and do
 /// not decrease.
-pub(super) const MOST_GAIN_MEASURED: f64 = 30.0;
+pub(super) const MAX_GAIN_MEASURED: f64 = 30.0;
 /// Safety factor of the step: by the estimate, a step longer by this factor must suffice. Errors do not decrease
 /// smoothly, for example if the steps near a pericentre are placed differently.
 pub(super) const LONGER: f64 = 1.2;
@@ -279,18 +279,18 @@ impl<'r> Noting<'r> {
 }
 
 impl Runner for Noting<'_> {
-    fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
-        let ran = self.runner.run(way);
+    fn run(&mut self, settings: &RunSettings<'_>) -> Result<Ran, Failed> {
+        let ran = self.runner.run(settings);
         ran.inspect_err(|failed| self.note(failed))
     }
 
-    fn run_beside(
+    fn run_pair(
         &mut self,
-        way: &Way<'_>,
-        better: &Way<'_>,
+        settings: &RunSettings<'_>,
+        better: &RunSettings<'_>,
         observer: &mut PairObserver<'_>,
-    ) -> Result<RanBeside, Failed> {
-        let ran = self.runner.run_beside(way, better, observer);
+    ) -> Result<PairRun, Failed> {
+        let ran = self.runner.run_pair(settings, better, observer);
         ran.inspect_err(|failed| self.note(failed))
     }
 }
@@ -298,7 +298,7 @@ impl Runner for Noting<'_> {
 #[cfg(test)]
 mod tests {
     use super::{
-        Failed, Noting, PairObserver, Ran, RanBeside, RunErrorKind, Runner, StepError, Way,
+        Failed, Noting, PairObserver, PairRun, Ran, RunErrorKind, RunSettings, Runner, StepError,
     };
     use tfe_runtime::Element;
 
@@ -306,25 +306,25 @@ mod tests {
     struct Failing;
 
     impl Runner for Failing {
-        fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
+        fn run(&mut self, settings: &RunSettings<'_>) -> Result<Ran, Failed> {
             Err(Failed::from(RunErrorKind::Solve {
                 element: 0,
                 time: 0.0,
-                step: way.step,
-                source: match way.step < 1.0 {
+                step: settings.step,
+                source: match settings.step < 1.0 {
                     true => StepError::Slides,
                     false => StepError::TooManyKinks,
                 },
             }))
         }
 
-        fn run_beside(
+        fn run_pair(
             &mut self,
-            way: &Way<'_>,
-            _: &Way<'_>,
+            settings: &RunSettings<'_>,
+            _: &RunSettings<'_>,
             _: &mut PairObserver<'_>,
-        ) -> Result<RanBeside, Failed> {
-            Err(self.run(way).expect_err("all runs fail"))
+        ) -> Result<PairRun, Failed> {
+            Err(self.run(settings).expect_err("all runs fail"))
         }
     }
 
@@ -333,7 +333,7 @@ mod tests {
         let mut failing = Failing;
         let mut noting = Noting::new(&mut failing);
         for step in steps {
-            let way = Way {
+            let settings = RunSettings {
                 element: Element::mixed(5),
                 tolerance: 1e-9,
                 by_iteration: false,
@@ -342,7 +342,7 @@ mod tests {
                 grading: None,
                 keeps: false,
             };
-            assert!(noting.run(&way).is_err());
+            assert!(noting.run(&settings).is_err());
         }
         noting.explained(RunErrorKind::TooManySteps { span: 10.0, step })
     }

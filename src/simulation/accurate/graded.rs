@@ -3,7 +3,7 @@
 use super::pilots::Pilots;
 use super::repeatable::Repeatable;
 use crate::accuracy::{
-    Asked, Course, Graded, Grading, damping_element_for, element_for, explore, factor_for,
+    Asked, Graded, Grading, PilotSettings, damping_element_for, element_for, explore, factor_for,
 };
 use tfe_runtime::{Element, Facts, Statistics};
 
@@ -41,7 +41,7 @@ pub(super) fn graded(
         None => smooth,
     };
     let length = (asked.span.end - asked.span.start).abs();
-    let course = Course {
+    let settings = PilotSettings {
         span: asked.span.clone(),
         breaks: asked.breaks.clone(),
         longest: asked.longest.map_or(length, |step| step.abs().min(length)),
@@ -49,8 +49,8 @@ pub(super) fn graded(
         first,
         local: LOCAL,
     };
-    let mut pair = Pilots::new(run, element, &course).ok()?;
-    let grading = explore(&course, &mut pair);
+    let mut pair = Pilots::new(run, element, &settings).ok()?;
+    let grading = explore(&settings, &mut pair);
     *work = pair.work();
     let grading = grading?;
     let element = if asked.element.is_none() && pair.by_newton() < FEW {
@@ -62,7 +62,7 @@ pub(super) fn graded(
     Some(Graded {
         grading,
         element,
-        factor: factor_for(asked.accuracy, element, course.local, steps),
+        factor: factor_for(asked.accuracy, element, settings.local, steps),
     })
 }
 

@@ -2,8 +2,8 @@
 
 use super::super::times::{Times, up_to_break};
 use super::repeatable::{Repeatable, Stepping};
-use super::runs::MOST_ITERATIONS;
-use crate::accuracy::{Course, Pair, Trace, next};
+use super::runs::MAX_ITERATIONS;
+use crate::accuracy::{Pair, PilotSettings, Trace, next};
 use crate::error::RunErrorKind;
 use tfe_runtime::{Element, Statistics, StepError};
 
@@ -18,7 +18,7 @@ pub(super) struct Pilots<'r> {
     /// The states that both have reached, with outputs, as rows of numbers.
     rows: [Vec<f64>; 2],
     trace: Trace,
-    apart: Vec<f64>,
+    differences: Vec<f64>,
     sizes: Vec<f64>,
     mesh: Times,
     breaks: Vec<f64>,
@@ -34,13 +34,13 @@ impl<'r> Pilots<'r> {
     pub(super) fn new(
         run: &'r dyn Repeatable,
         element: Element,
-        course: &Course,
+        settings: &PilotSettings,
     ) -> Result<Self, RunErrorKind> {
-        let Course { span, local, .. } = course;
+        let PilotSettings { span, local, .. } = settings;
         let given = run.given();
         let mut control = given.control;
         control.tolerance = TOLERANCE * local;
-        control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
+        control.max_iterations = control.max_iterations.min(MAX_ITERATIONS);
         let stepper = |element| run.stepper(element, control, false);
         let steppers = [
             stepper(element)?,
@@ -53,14 +53,14 @@ impl<'r> Pilots<'r> {
             state: start.clone(),
             rows: [vec![0.0; width], vec![0.0; width]],
             trace,
-            apart: Vec::new(),
+            differences: Vec::new(),
             sizes: Vec::new(),
             mesh: given.even(
                 element,
                 &[span.start, span.end],
                 (span.end - span.start).abs(),
             )?,
-            breaks: course.breaks.clone(),
+            breaks: settings.breaks.clone(),
             end: span.end,
             newton: 0,
             kept: (0, 0),
@@ -115,7 +115,7 @@ impl Pair for Pilots<'_> {
         }
         self.newton = self.newton_iterations() - before;
         let [row, better] = &self.rows;
-        self.trace.apart(row, better, &mut self.apart);
+        self.trace.differences(row, better, &mut self.differences);
         self.trace.sizes_with(better, &mut self.sizes);
         true
     }
@@ -124,8 +124,8 @@ impl Pair for Pilots<'_> {
         self.slides
     }
 
-    fn apart(&self) -> &[f64] {
-        &self.apart
+    fn differences(&self) -> &[f64] {
+        &self.differences
     }
 
     fn sizes(&self) -> &[f64] {

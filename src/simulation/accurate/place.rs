@@ -1,7 +1,7 @@
 //! Detects a time that runs cannot pass with any step size, such as a singularity of the motion.
 
 use super::repeatable::{Repeatable, Stepping, trusting};
-use crate::accuracy::{Trace, Way};
+use crate::accuracy::{RunSettings, Trace};
 use crate::error::RunErrorKind;
 use crate::simulation::times::Times;
 
@@ -34,7 +34,7 @@ impl Place {
     pub(super) fn is_an_end(
         &mut self,
         run: &dyn Repeatable,
-        (way, mesh): (&Way<'_>, &Times),
+        (settings, mesh): (&RunSettings<'_>, &Times),
         stopped: (&RunErrorKind, &[f64]),
     ) -> bool {
         /// The number of failures after which trial steps are made, and the number after which two step sizes must also
@@ -43,7 +43,7 @@ impl Place {
         let (start, _) = run.given().start;
         let times = self.meet(start, stopped.0);
         let [often, very_often] = OFTEN;
-        times >= often && !is_passed(run, way, mesh, stopped, times >= very_often)
+        times >= often && !is_passed(run, settings, mesh, stopped, times >= very_often)
     }
 }
 
@@ -53,7 +53,7 @@ impl Place {
 /// by chance: two runs with different step sizes then reach different states.
 fn is_passed(
     run: &dyn Repeatable,
-    way: &Way<'_>,
+    settings: &RunSettings<'_>,
     mesh: &Times,
     (kind, state): (&RunErrorKind, &[f64]),
     compares: bool,
@@ -63,7 +63,7 @@ fn is_passed(
         return true;
     };
     let given = run.given();
-    let Ok(mut stepper) = run.stepper(way.element, trusting(given.control), false) else {
+    let Ok(mut stepper) = run.stepper(settings.element, trusting(given.control), false) else {
         return true;
     };
     let mut trace = given.trace();
@@ -86,11 +86,11 @@ fn is_passed(
 fn agree(trace: &Trace, [one, other]: &[Vec<f64>; 2]) -> bool {
     /// The largest difference, relative to the largest number of the same kind, of two runs that agree.
     const SAME: f64 = 0.1;
-    let (mut apart, mut sizes) = (Vec::new(), Vec::new());
-    trace.apart(one, other, &mut apart);
+    let (mut differences, mut sizes) = (Vec::new(), Vec::new());
+    trace.differences(one, other, &mut differences);
     trace.sizes_with(one, &mut sizes);
-    let mut kinds = apart.iter().zip(&sizes);
-    kinds.all(|(apart, size)| *apart <= SAME * size)
+    let mut kinds = differences.iter().zip(&sizes);
+    kinds.all(|(differences, size)| *differences <= SAME * size)
 }
 
 /// The outcome of trial steps beyond a time at which a run has failed.
@@ -111,12 +111,12 @@ fn beyond(
 ) -> Beyond {
     /// The length of the trial, in steps of the failed run.
     const FAR: f64 = 4.0;
-    const MOST: u32 = 2000;
+    const MAX: u32 = 2000;
     /// A remainder shorter than this relative amount of a step is rounding error, and gets no step of its own.
     const ROUNDINGS: f64 = 1.0 - 1e-9;
     let end = time + FAR * step;
     let (mut t, mut h, mut state) = (time, first, state.to_vec());
-    for _ in 0..MOST {
+    for _ in 0..MAX {
         let is_last = h.abs() >= ROUNDINGS * (end - t).abs();
         let next = if is_last { end } else { t + h };
         if next == t {

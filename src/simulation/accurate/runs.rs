@@ -3,7 +3,9 @@
 use super::place::Place;
 use super::repeatable::{Repeatable, Stepping};
 use super::watcher::{Watcher, follow};
-use crate::accuracy::{Beside, Failed, PairObserver, Ran, RanBeside, Runner, Trace, Way};
+use crate::accuracy::{
+    Failed, PairComparison, PairObserver, PairRun, Ran, RunSettings, Runner, Trace,
+};
 use crate::error::RunErrorKind;
 use crate::simulation::times::Times;
 use std::mem;
@@ -12,7 +14,7 @@ use tfe_runtime::constrained::Trail;
 use tfe_runtime::{Element, Solve, Statistics};
 
 /// The largest number of fixed-point iterations a step; with more, Newton's method is cheaper.
-pub(super) const MOST_ITERATIONS: u32 = 25;
+pub(super) const MAX_ITERATIONS: u32 = 25;
 
 /// What a search keeps besides its result and its motion.
 pub(super) struct Kept {
@@ -56,7 +58,7 @@ struct Reusable<'a> {
 
 impl<'a> Runs<'a> {
     /// The number of steppers that are kept: those of two elements.
-    const MOST_STEPPERS: usize = 2;
+    const MAX_STEPPERS: usize = 2;
 
     pub(super) fn new(run: &'a dyn Repeatable, kept: &'a mut Kept) -> Self {
         Self {
@@ -69,16 +71,17 @@ impl<'a> Runs<'a> {
     }
 
     /// A stepper at the start with the element, the solver and the tolerance of a run, from those that are kept or new.
-    fn take_stepper(&mut self, way: &Way<'_>) -> Result<Reusable<'a>, RunErrorKind> {
-        let mut reusable = self.find_stepper(way)?;
-        reusable.stepper.set_tolerance(way.tolerance);
+    fn take_stepper(&mut self, settings: &RunSettings<'_>) -> Result<Reusable<'a>, RunErrorKind> {
+        let mut reusable = self.find_stepper(settings)?;
+        reusable.stepper.set_tolerance(settings.tolerance);
         Ok(reusable)
     }
 
-    fn find_stepper(&mut self, way: &Way<'_>) -> Result<Reusable<'a>, RunErrorKind> {
+    fn find_stepper(&mut self, settings: &RunSettings<'_>) -> Result<Reusable<'a>, RunErrorKind> {
         let given = self.run.given();
-        let is_known =
-            |one: &Reusable<'a>| (one.by_iteration, one.element) == (way.by_iteration, way.element);
+        let is_known = |one: &Reusable<'a>| {
+            (one.by_iteration, one.element) == (settings.by_iteration, settings.element)
+        };
         if let Some(known) = self.steppers.iter().position(is_known) {
             let mut known = self.steppers.remove(known);
             let (t, start) = &given.start;
@@ -86,14 +89,14 @@ impl<'a> Runs<'a> {
             return Ok(known);
         }
         let mut control = given.control;
-        if way.by_iteration {
+        if settings.by_iteration {
             control.solve = Solve::FixedPoint;
-            control.max_iterations = control.max_iterations.min(MOST_ITERATIONS);
+            control.max_iterations = control.max_iterations.min(MAX_ITERATIONS);
         }
         Ok(Reusable {
-            by_iteration: way.by_iteration,
-            element: way.element,
-            stepper: self.run.stepper(way.element, control, true)?,
+            by_iteration: settings.by_iteration,
+            element: settings.element,
+            stepper: self.run.stepper(settings.element, control, true)?,
         })
     }
 
@@ -102,26 +105,26 @@ impl<'a> Runs<'a> {
         let taken = reusable.stepper.take_statistics();
         self.kept.work.merge(&taken);
         self.steppers.insert(0, reusable);
-        self.steppers.truncate(Self::MOST_STEPPERS);
+        self.steppers.truncate(Self::MAX_STEPPERS);
         taken
     }
 
-    fn mesh(&self, way: &Way<'_>) -> Result<Times, RunErrorKind> {
+    fn mesh(&self, settings: &RunSettings<'_>) -> Result<Times, RunErrorKind> {
         let given = self.run.given();
-        match way.grading {
-            Some(grading) => given.through(way.element, &way.nodes(grading)),
-            None => given.even(way.element, way.cuts, way.step),
+        match settings.grading {
+            Some(grading) => given.through(settings.element, &settings.nodes(grading)),
+            None => given.even(settings.element, settings.cuts, settings.step),
         }
     }
 
     fn trace(
         &mut self,
         stepper: &mut dyn Stepping,
-        way: &Way<'_>,
+        settings: &RunSettings<'_>,
         mesh: &Times,
     ) -> Result<Trace, Failed> {
-        let (run, times) = (self.run, &way.cuts[1..]);
-        if way.keeps {
+        let (run, times) = (self.run, &settings.cuts[1..]);
+        if settings.keeps {
             let mut watcher = Watcher::new(run, stepper);
             let mut times = times.iter().peekable();
             stepper.record(mesh, true, &mut |at| {
@@ -137,7 +140,7 @@ impl<'a> Runs<'a> {
             let given = run.given();
             if !given.has_events {
                 let stopped = (&failed.kind, &state[..]);
-                failed.is_final |= self.place.is_an_end(run, (way, mesh), stopped);
+                failed.is_final |= self.place.is_an_end(run, (settings, mesh), stopped);
             }
             self.kept.keep_part(given.start.0, t, state);
             failed
@@ -146,10 +149,10 @@ impl<'a> Runs<'a> {
 }
 
 impl Runner for Runs<'_> {
-    fn run(&mut self, way: &Way<'_>) -> Result<Ran, Failed> {
-        let mesh = self.mesh(way)?;
-        let mut reusable = self.take_stepper(way)?;
-        let trace = self.trace(&mut *reusable.stepper, way, &mesh);
+    fn run(&mut self, settings: &RunSettings<'_>) -> Result<Ran, Failed> {
+        let mesh = self.mesh(settings)?;
+        let mut reusable = self.take_stepper(settings)?;
+        let trace = self.trace(&mut *reusable.stepper, settings, &mesh);
         let taken = self.keep_stepper(reusable);
         let crosses_kinks = self.run.given().crosses_kinks;
         Ok(Ran {
@@ -158,15 +161,15 @@ impl Runner for Runs<'_> {
         })
     }
 
-    fn run_beside(
+    fn run_pair(
         &mut self,
-        way: &Way<'_>,
-        better: &Way<'_>,
+        settings: &RunSettings<'_>,
+        better: &RunSettings<'_>,
         observer: &mut PairObserver<'_>,
-    ) -> Result<RanBeside, Failed> {
+    ) -> Result<PairRun, Failed> {
         let run = self.run;
-        let mesh = self.mesh(way)?;
-        let (mut first, mut second) = (self.take_stepper(way)?, self.take_stepper(better)?);
+        let mesh = self.mesh(settings)?;
+        let (mut first, mut second) = (self.take_stepper(settings)?, self.take_stepper(better)?);
         let mut watchers = [
             Watcher::new(run, &mut *first.stepper),
             Watcher::new(run, &mut *second.stepper),
@@ -179,7 +182,7 @@ impl Runner for Runs<'_> {
         let mut shown = Shown::default();
         let mut failure = None;
         let mut goes_on = ControlFlow::Continue(());
-        let beside = &mut second.stepper;
+        let comparison = &mut second.stepper;
         let passed = first.stepper.record(&mesh, true, &mut |at| {
             // The second stepper makes the same step.
             let Some((element, (from, next, h))) = elements.next() else {
@@ -187,19 +190,19 @@ impl Runner for Runs<'_> {
             };
             here.clear();
             at.arrived.leave(&mut here);
-            beside.foresee(&here, (from, h));
-            if let Err(source) = beside.advance(&mesh, (from, next, h)) {
+            comparison.foresee(&here, (from, h));
+            if let Err(source) = comparison.advance(&mesh, (from, next, h)) {
                 failure = Some(run.failed(element, (from, h), source));
                 return ControlFlow::Break(());
             }
-            beside.leave(&mut trail);
+            comparison.leave(&mut trail);
             if let Some((_, (from, _, h))) = elements.peek() {
                 at.arrived.foresee(&before, (*from, *h));
             }
             let [one, other] = &mut watchers;
             one.pass(at.arrived, at.acts, true);
             // Pairs are not used for runs with events, so the parameters are those of the given model.
-            other.pass(&mut **beside, 0, true);
+            other.pass(&mut **comparison, 0, true);
             goes_on = shown.compare(at.t, &watchers, observer);
             goes_on
         });
@@ -210,10 +213,10 @@ impl Runner for Runs<'_> {
         if let Some(kind) = passed.err().or(failure) {
             let mut failed = Failed::from(kind);
             let stopped = (&failed.kind, &state[..]);
-            failed.is_final |= self.place.is_an_end(run, (way, &mesh), stopped);
+            failed.is_final |= self.place.is_an_end(run, (settings, &mesh), stopped);
             return Err(failed);
         }
-        Ok(RanBeside {
+        Ok(PairRun {
             traces: watchers.map(|watcher| watcher.trace),
             times: shown.times,
             is_complete: goes_on.is_continue(),
@@ -226,7 +229,7 @@ impl Runner for Runs<'_> {
 struct Shown {
     /// The times of the nodes.
     times: Vec<f64>,
-    apart: Vec<f64>,
+    differences: Vec<f64>,
     sizes: Vec<f64>,
 }
 
@@ -239,11 +242,13 @@ impl Shown {
         observer: &mut PairObserver<'_>,
     ) -> ControlFlow<()> {
         self.times.push(time);
-        other.trace.apart(&one.row, &other.row, &mut self.apart);
+        other
+            .trace
+            .differences(&one.row, &other.row, &mut self.differences);
         other.trace.sizes_with(&one.row, &mut self.sizes);
-        observer(&Beside {
+        observer(&PairComparison {
             time,
-            apart: &self.apart,
+            differences: &self.differences,
             sizes: &self.sizes,
         })
     }

@@ -33,7 +33,7 @@ impl Default for Clear {
             bounds: Vec::new(),
             sides: Vec::new(),
             growth: Self::FIRST,
-            most: Self::MOST,
+            most: Self::MAX,
             wait: 0,
             reached: Vec::new(),
             enclosures: Vec::new(),
@@ -43,7 +43,7 @@ impl Default for Clear {
 
 impl Clear {
     const FIRST: f64 = 8.0;
-    const MOST: f64 = 128.0;
+    const MAX: f64 = 128.0;
     /// The factor by which the largest size recovers with each box.
     const RECOVERY: f64 = 1.05;
     /// The number of steps without an attempt after not even the range of one step was free of zeros.
@@ -95,7 +95,7 @@ impl Clear {
             self.growth = (0.25 * self.growth).max(1.0);
         }
         self.most *= Self::RECOVERY;
-        self.growth = (2.0 * self.growth).min(self.most.clamp(1.0, Self::MOST));
+        self.growth = (2.0 * self.growth).min(self.most.clamp(1.0, Self::MAX));
         true
     }
 

@@ -42,19 +42,19 @@ const COST_OF_SILENCE: u32 = 8;
 
 /// What bounds prove about a function in a part of an element.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Course {
+pub(super) enum ZeroProof {
     /// It has no zero, or it is monotonic: the signs at the ends tell all.
-    Plain,
+    AtMostOne,
     /// Neither of these is proved.
-    Bent,
+    Unproved,
     /// There are no bounds.
-    Unknown,
+    Unbounded,
 }
 
 /// Divides an element into parts in each of which a function crosses zero at most once; returns the ends of the parts.
 /// This is proved for all parts but the narrowest, and those left after [`MAX_QUESTIONS`], which are no wider than one
 /// of `samples` equal parts.
-fn places(samples: usize, course: &mut dyn FnMut((f64, f64)) -> Course) -> Vec<f64> {
+fn places(samples: usize, proof: &mut dyn FnMut((f64, f64)) -> ZeroProof) -> Vec<f64> {
     let wide = 1.0 / samples as f64;
     let (mut ends, mut level) = (Vec::new(), vec![(0.0, 1.0)]);
     let mut questions = MAX_QUESTIONS;
@@ -62,17 +62,17 @@ fn places(samples: usize, course: &mut dyn FnMut((f64, f64)) -> Course) -> Vec<f
         let mut next = Vec::new();
         for (from, to) in level {
             let answer = match (to - from <= NARROWEST, questions) {
-                (true, _) => Course::Plain,
-                (false, 0) if to - from <= wide => Course::Plain,
-                (false, 0) => Course::Unknown,
-                (false, _) => course((from, to)),
+                (true, _) => ZeroProof::AtMostOne,
+                (false, 0) if to - from <= wide => ZeroProof::AtMostOne,
+                (false, 0) => ZeroProof::Unbounded,
+                (false, _) => proof((from, to)),
             };
             let cost = match answer {
-                Course::Unknown => COST_OF_SILENCE,
+                ZeroProof::Unbounded => COST_OF_SILENCE,
                 _ => 1,
             };
             questions = questions.saturating_sub(cost);
-            if answer == Course::Plain {
+            if answer == ZeroProof::AtMostOne {
                 ends.push(to);
             } else {
                 let middle = 0.5 * (from + to);
@@ -95,7 +95,7 @@ pub(super) fn crossings(
     samples: usize,
     resolution: f64,
     values: &dyn Fn(f64, &mut Vec<f64>),
-    course: &mut dyn FnMut(usize, (f64, f64)) -> Course,
+    proof: &mut dyn FnMut(usize, (f64, f64)) -> ZeroProof,
 ) -> (Vec<Root>, Vec<f64>) {
     let row = |tau: &f64| {
         let mut row = Vec::with_capacity(sides.len());
@@ -109,7 +109,7 @@ pub(super) fn crossings(
             let part = 1.0 / samples as f64;
             times.extend((1..=CLOSER).map(|k| part * 4.0_f64.powi(-k)));
         }
-        times.extend(places(samples, &mut |part| course(function, part)));
+        times.extend(places(samples, &mut |part| proof(function, part)));
         times.sort_by(f64::total_cmp);
         times.dedup();
         let mut value = |tau: f64| row(&tau)[function];
@@ -198,7 +198,7 @@ mod tests {
     fn taus(side: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
         let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
         let (roots, _) = crossings((&[side], &[0.0]), 8, 1e-15, &values, &mut |_, _| {
-            Course::Unknown
+            ZeroProof::Unbounded
         });
         roots.iter().map(|root| root.tau).collect()
     }
@@ -245,8 +245,8 @@ mod tests {
         let f = |tau: f64| if tau < 1e-9 { 1e-17 } else { 1e-16 - tau * tau };
         let values = |tau: f64, row: &mut Vec<f64>| row.push(if tau == 0.0 { 0.0 } else { f(tau) });
         let found = |rounding: f64| {
-            let mut course = |_, _: (f64, f64)| Course::Unknown;
-            crossings((&[0.0], &[rounding]), 8, 1e-15, &values, &mut course)
+            let mut proof = |_, _: (f64, f64)| ZeroProof::Unbounded;
+            crossings((&[0.0], &[rounding]), 8, 1e-15, &values, &mut proof)
         };
         assert_eq!(found(0.0).0.len(), 1);
         assert_eq!(found(1e-15), (Vec::new(), vec![-1.0]));
@@ -259,16 +259,16 @@ mod tests {
         let f = |tau: f64| (tau - 0.3) * (tau - near);
         let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
         let mut questions = 0;
-        let mut course = |_, (from, to): (f64, f64)| {
+        let mut proof = |_, (from, to): (f64, f64)| {
             questions += 1;
             let turn = 0.5 * (0.3 + near);
             if to < turn || from > turn {
-                Course::Plain
+                ZeroProof::AtMostOne
             } else {
-                Course::Bent
+                ZeroProof::Unproved
             }
         };
-        let (roots, sides) = crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut course);
+        let (roots, sides) = crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut proof);
         let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
         assert!(is_near(&found, &[0.3, near]), "{found:?}");
         assert_eq!((sides, questions), (vec![1.0], 39));
@@ -281,15 +281,15 @@ mod tests {
             let [first, second] = expected;
             let f = |tau: f64| (tau - first) * (tau - second);
             let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
-            let mut course = |_, (from, to): (f64, f64)| {
+            let mut proof = |_, (from, to): (f64, f64)| {
                 let turn = 0.5 * (first + second);
                 if to < turn || from > turn {
-                    Course::Plain
+                    ZeroProof::AtMostOne
                 } else {
-                    Course::Bent
+                    ZeroProof::Unproved
                 }
             };
-            let (roots, sides) = crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut course);
+            let (roots, sides) = crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut proof);
             let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
             assert!(is_near(&found, &expected), "{found:?}");
             assert_eq!(sides, vec![1.0]);
@@ -298,11 +298,11 @@ mod tests {
 
     #[test]
     fn parts_are_as_narrow_as_need_be() {
-        let plain = places(8, &mut |_| Course::Plain);
+        let plain = places(8, &mut |_| ZeroProof::AtMostOne);
         assert_eq!(plain, [1.0]);
-        let unknown = places(10, &mut |_| Course::Unknown);
+        let unknown = places(10, &mut |_| ZeroProof::Unbounded);
         assert!(unknown.len() == 17 && unknown.windows(2).all(|two| two[0] < two[1]));
-        let bent = places(10, &mut |_| Course::Bent);
+        let bent = places(10, &mut |_| ZeroProof::Unproved);
         assert!(
             bent.len() >= 64 && bent.last() == Some(&1.0),
             "{}",

@@ -4,7 +4,7 @@ use super::act::{Action, Crossing, On};
 use super::clear::Clear;
 use super::remodel::{Remodel, remodel};
 use super::value::{Function, Value};
-use super::{Events, Rooms, Watched};
+use super::{Buffers, Events, Watched};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::motion::Seen;
@@ -176,7 +176,7 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             due: VecDeque::new(),
             watched,
             clear: Clear::default(),
-            rooms: Rooms::new(names.len()),
+            rooms: Buffers::new(names.len()),
             met: Vec::new(),
             recorded: Vec::new(),
             cuts: 0,

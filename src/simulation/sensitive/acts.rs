@@ -26,7 +26,7 @@ pub(super) struct Acting<'a, 'm, const N: usize, L: Length<N>> {
 }
 
 /// How an event moves with a quantity, such as that of one column.
-pub(super) struct Way<const N: usize, L: Length<N>> {
+pub(super) struct EventMotion<const N: usize, L: Length<N>> {
     pub(super) change: Change<N, L>,
     pub(super) time: f64,
     /// The index of the parameter, if the quantity is one.
@@ -46,9 +46,9 @@ fn scale(size: f64) -> f64 {
 
 impl<const N: usize, L: Length<N>> Jump<'_, '_, N, L> {
     /// No motion.
-    pub(super) fn still(&self) -> Way<N, L> {
+    pub(super) fn still(&self) -> EventMotion<N, L> {
         let event = self.severed.event;
-        Way {
+        EventMotion {
             change: Change::by(None, &event.q),
             time: 0.0,
             parameter: None,
@@ -68,8 +68,8 @@ impl<const N: usize, L: Length<N>> Jump<'_, '_, N, L> {
     }
 
     /// A motion along a change and in time.
-    pub(super) fn towards(&self, change: Change<N, L>, time: f64) -> Way<N, L> {
-        Way {
+    pub(super) fn towards(&self, change: Change<N, L>, time: f64) -> EventMotion<N, L> {
+        EventMotion {
             distance: DISTANCE / scale(self.size(&change)),
             change,
             time,
@@ -78,16 +78,16 @@ impl<const N: usize, L: Length<N>> Jump<'_, '_, N, L> {
     }
 
     /// The effect of a parameter alone, with a longer step of differences.
-    pub(super) fn by_parameter(&self, index: usize) -> (Way<N, L>, f64) {
+    pub(super) fn by_parameter(&self, index: usize) -> (EventMotion<N, L>, f64) {
         let size = scale(self.model.parameter_value(index).abs());
         let change = Change::by(Some(index), &self.severed.event.q);
-        let way = Way {
+        let motion = EventMotion {
             parameter: Some(index),
             velocity: (self.velocity)(&change),
             distance: DISTANCE * size,
             ..self.still()
         };
-        (way, DISTANCE * size.max(1.0))
+        (motion, DISTANCE * size.max(1.0))
     }
 
     /// The scales of coordinates and of momenta. At an event something vanishes, possibly the only coordinate; the
@@ -102,9 +102,13 @@ impl<const N: usize, L: Length<N>> Jump<'_, '_, N, L> {
     }
 
     /// The state after the action for an event that has moved by `s`, in the order (p, q).
-    pub(super) fn moved(&self, way: &Way<N, L>, s: f64) -> Result<Vec<f64>, TransitionError> {
+    pub(super) fn moved(
+        &self,
+        motion: &EventMotion<N, L>,
+        s: f64,
+    ) -> Result<Vec<f64>, TransitionError> {
         let by = (&self.severed.watched.on, &self.severed.watched.value);
-        let found = state_after(self.model, by, self.severed.event, &self.near(way, s));
+        let found = state_after(self.model, by, self.severed.event, &self.near(motion, s));
         let found = found.filter(|found| self.model.check_start(found).is_ok());
         let found = found.ok_or(TransitionError::from(StepError::NonFinite))?;
         let (q, p) = L::parts(&found);
@@ -115,12 +119,12 @@ impl<const N: usize, L: Length<N>> Jump<'_, '_, N, L> {
     /// the order (p, q).
     pub(super) fn derivative(
         &self,
-        way: &Way<N, L>,
+        motion: &EventMotion<N, L>,
         longer: f64,
         of: &dyn Fn(&[f64]) -> f64,
     ) -> Result<f64, TransitionError> {
-        let slope = derivative_of_either([longer, way.distance], |s| {
-            let numbers = self.moved(way, s);
+        let slope = derivative_of_either([longer, motion.distance], |s| {
+            let numbers = self.moved(motion, s);
             numbers.map_or(f64::NAN, |numbers| of(&numbers))
         });
         match slope.is_finite() {
@@ -130,20 +134,20 @@ impl<const N: usize, L: Length<N>> Jump<'_, '_, N, L> {
     }
 
     /// The event moved by `s`.
-    fn near(&self, way: &Way<N, L>, s: f64) -> Near<N, L> {
+    fn near(&self, motion: &EventMotion<N, L>, s: f64) -> Near<N, L> {
         let event = self.severed.event;
         let moved = |from: &L::Vector, by: &L::Vector| {
             let by = by.as_ref();
             L::from_fn(from, |a| from.as_ref()[a] + s * by[a])
         };
         Near {
-            t: event.t + s * way.time,
+            t: event.t + s * motion.time,
             state: L::state(
-                moved(&event.q, &way.change.q),
-                moved(&event.p, &way.change.p),
+                moved(&event.q, &motion.change.q),
+                moved(&event.p, &motion.change.p),
             ),
-            velocity: L::from_fn(&event.v, |a| s * way.velocity.as_ref()[a]),
-            parameter: way.parameter.map(|index| (index, s)),
+            velocity: L::from_fn(&event.v, |a| s * motion.velocity.as_ref()[a]),
+            parameter: motion.parameter.map(|index| (index, s)),
         }
     }
 }
@@ -158,19 +162,19 @@ impl<const N: usize, L: Length<N>> Acting<'_, '_, N, L> {
         let mut after = self.at.clone();
         for (column, mut after) in after.column_iter_mut().enumerate() {
             after.fill(0.0);
-            for way in self.ways(column, parameter(column)) {
-                if let Some(longer) = way.longer {
+            for motion in self.motions(column, parameter(column)) {
+                if let Some(longer) = motion.longer {
                     for (row, after) in after.iter_mut().enumerate() {
-                        *after += jump.derivative(&way, longer, &|numbers| numbers[row])?;
+                        *after += jump.derivative(&motion, longer, &|numbers| numbers[row])?;
                     }
                     continue;
                 }
                 for (k, weight) in (1..).zip(SIXTH) {
-                    let s = f64::from(k) * way.distance;
-                    let (high, low) = (jump.moved(&way, s)?, jump.moved(&way, -s)?);
+                    let s = f64::from(k) * motion.distance;
+                    let (high, low) = (jump.moved(&motion, s)?, jump.moved(&motion, -s)?);
                     let pairs = high.iter().zip(&low);
                     for (after, (high, low)) in after.iter_mut().zip(pairs) {
-                        *after += weight * (high - low) / way.distance;
+                        *after += weight * (high - low) / motion.distance;
                     }
                 }
             }
@@ -200,8 +204,8 @@ impl<const N: usize, L: Length<N>> Acting<'_, '_, N, L> {
             act: Arc::new(watched),
             ..on.clone()
         };
-        let set = |way: &Way<N, L>, s: f64| {
-            let near = self.jump.near(way, s);
+        let set = |motion: &EventMotion<N, L>, s: f64| {
+            let near = self.jump.near(motion, s);
             let _ = state_after(
                 self.jump.model,
                 (&on, value),
@@ -211,15 +215,15 @@ impl<const N: usize, L: Length<N>> Acting<'_, '_, N, L> {
             seen.lock().unwrap_or_else(PoisonError::into_inner).take()
         };
         let names = self.jump.model.parameter_names();
-        for way in (0..self.times.len()).filter_map(|column| self.motion(column)) {
-            for (place, (name, value)) in set(&way, 0.0)?.into_iter().enumerate() {
+        for motion in (0..self.times.len()).filter_map(|column| self.motion(column)) {
+            for (place, (name, value)) in set(&motion, 0.0)?.into_iter().enumerate() {
                 // NaN if the action sets something else nearby.
                 let nearby = |s: f64| {
-                    let settings = set(&way, s).unwrap_or_default();
+                    let settings = set(&motion, s).unwrap_or_default();
                     let own = settings.get(place).filter(|(other, _)| *other == name);
                     own.map_or(f64::NAN, |(_, value)| *value)
                 };
-                let change = derivative(way.distance, nearby) * way.distance / DISTANCE;
+                let change = derivative(motion.distance, nearby) * motion.distance / DISTANCE;
                 let known = names.iter().position(|own| own.is(&name));
                 let before = known.map_or(0.0, |index| self.jump.model.parameter_value(index));
                 let size = larger(value.abs(), before.abs());
@@ -237,7 +241,7 @@ impl<const N: usize, L: Length<N>> Acting<'_, '_, N, L> {
 
     /// How the event moves with a column. Motion and parameter are moved together if one step suits both, so that
     /// constraints that contain the parameter stay satisfied; otherwise one after the other.
-    fn ways(&self, column: usize, parameter: Option<usize>) -> Vec<Way<N, L>> {
+    fn motions(&self, column: usize, parameter: Option<usize>) -> Vec<EventMotion<N, L>> {
         /// The largest ratio of the two steps. A step shorter than necessary by this factor loses two digits; in a step
         /// suited to a tiny parameter, the state would change by rounding only.
         const TOGETHER: f64 = 100.0;
@@ -251,9 +255,9 @@ impl<const N: usize, L: Length<N>> Acting<'_, '_, N, L> {
             None => vec![own],
             Some(motion) if motion.distance > TOGETHER * own.distance => {
                 let longer = Some(longer);
-                vec![motion, Way { longer, ..own }]
+                vec![motion, EventMotion { longer, ..own }]
             }
-            Some(motion) => vec![Way {
+            Some(motion) => vec![EventMotion {
                 change: motion.change,
                 time: motion.time,
                 distance: motion.distance.min(own.distance),
@@ -263,7 +267,7 @@ impl<const N: usize, L: Length<N>> Acting<'_, '_, N, L> {
     }
 
     /// How the event moves with a column at fixed parameters; `None` if it does not.
-    fn motion(&self, column: usize) -> Option<Way<N, L>> {
+    fn motion(&self, column: usize) -> Option<EventMotion<N, L>> {
         let change = Change::<N, L>::of_column(&self.jump.severed.event.q, self.at, column);
         let time = self.times[column];
         let is_moved = self.jump.size(&change) != 0.0 || time != 0.0;

@@ -62,7 +62,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         let model = &*self.model;
         let parameters: Vec<usize> = (0..model.parameters()).collect();
         let carrying = Carrying::new(model.len(), &parameters);
-        let mut course = Course {
+        let mut course = Carrier {
             carrying: match self.record_every {
                 1 => carrying.with_inside(),
                 _ => carrying,
@@ -80,13 +80,13 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
 
 /// Carries the derivatives by the parameters along a run.
 #[cfg(feature = "sparse")]
-struct Course<'a> {
+struct Carrier<'a> {
     carrying: Carrying,
     motion: &'a Motion<0, RunTimeLength>,
 }
 
 #[cfg(feature = "sparse")]
-impl<'m, M: family::Model> Retrace<'m, M> for Course<'_> {
+impl<'m, M: family::Model> Retrace<'m, M> for Carrier<'_> {
     fn element(
         &mut self,
         _: &M,

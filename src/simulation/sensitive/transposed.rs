@@ -1,6 +1,6 @@
 //! The transposed jump at an event, for gradients that go backwards (T-166).
 
-use super::acts::{DISTANCE, Way};
+use super::acts::{DISTANCE, EventMotion};
 use super::jump::Jump;
 use crate::differences::derivative_by_time;
 use crate::length::RunTimeLength;
@@ -19,7 +19,7 @@ pub(in crate::simulation) struct Given {
 }
 
 /// A motion of an event, with a longer step of differences.
-type Longer = (Way<0, RunTimeLength>, f64);
+type Longer = (EventMotion<0, RunTimeLength>, f64);
 
 impl Jump<'_, '_, 0, RunTimeLength> {
     /// λ S_y, λ S_t and λ S_a of the row λ = `lambda`, the derivatives by the state after the action in the order
@@ -95,7 +95,7 @@ impl Jump<'_, '_, 0, RunTimeLength> {
     /// The derivative by the time at a fixed state, of a number that depends on the state after the action.
     fn by_time(&self, of: &dyn Fn(&[f64]) -> f64) -> Result<f64, TransitionError> {
         let time = self.severed.event.t;
-        let later = Way {
+        let later = EventMotion {
             time: 1.0,
             ..self.still()
         };
@@ -127,7 +127,7 @@ impl Jump<'_, '_, 0, RunTimeLength> {
         let own = value.abs().max((self.severed.step * rate).abs());
         let longer = way.distance;
         let distance = longer.min(DISTANCE * own);
-        (Way { distance, ..way }, longer)
+        (EventMotion { distance, ..way }, longer)
     }
 
     /// The effect of a parameter together with that of a change of the state, with which the constraints stay
@@ -140,7 +140,7 @@ impl Jump<'_, '_, 0, RunTimeLength> {
         let way = self.towards(of_state(change), 0.0);
         let distance = way.distance.min(own.distance);
         let change = way.change;
-        let both = Way {
+        let both = EventMotion {
             change,
             distance,
             ..own

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::rc::Rc;
 
 /// Where the spectral radius exceeds one by less than this, the method is not called unstable.
-const LEAST_EXCESS: f64 = 1e-10;
+const MIN_EXCESS: f64 = 1e-10;
 /// Roots closer than this, relative to their position, are merged.
 const SAME_ROOT: f64 = 1e-12;
 
@@ -74,7 +74,7 @@ impl Search<'_> {
             }
             let verdicts: Vec<bool> = interior
                 .iter()
-                .filter_map(|sample| self.is_unstable(sample, LEAST_EXCESS))
+                .filter_map(|sample| self.is_unstable(sample, MIN_EXCESS))
                 .collect();
             let unstable = verdicts.iter().filter(|&&unstable| unstable).count();
             let margin = start + MARGIN * width..piece[1] - MARGIN * width;
@@ -83,9 +83,7 @@ impl Search<'_> {
                 .iter()
                 .filter(|sample| margin.contains(&sample.at));
             let mut here: Vec<(Sample, bool)> = sampled
-                .filter_map(|sample| {
-                    Some((sample.clone(), self.is_unstable(sample, LEAST_EXCESS)?))
-                })
+                .filter_map(|sample| Some((sample.clone(), self.is_unstable(sample, MIN_EXCESS)?)))
                 .collect();
             if !verdicts.is_empty() {
                 let majority = 2 * unstable > verdicts.len();

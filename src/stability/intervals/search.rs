@@ -14,7 +14,7 @@ pub(super) const SHORTEST: f64 = 1e-10;
 pub(super) const SPLIT: f64 = 0.4957;
 /// The largest number of evaluations. Three modes over about fifty periods, with all their crossings, need a sixth of
 /// it.
-const MOST_EVALUATIONS: usize = 200_000;
+const MAX_EVALUATIONS: usize = 200_000;
 
 /// The functions at one value of the parameter.
 #[derive(Clone, Debug)]
@@ -63,7 +63,7 @@ impl<'m> Search<'m> {
     }
 
     pub(super) fn matrix_at(&mut self, at: f64) -> Result<DMatrix<f64>, Failure> {
-        if self.evaluations >= MOST_EVALUATIONS {
+        if self.evaluations >= MAX_EVALUATIONS {
             return Err(IntervalError::Unresolved {
                 near: at,
                 evaluations: self.evaluations,

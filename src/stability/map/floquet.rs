@@ -63,7 +63,7 @@ impl MapPlan {
         self.check()?;
         let tables = SchemeTable::new(element.into()).map_err(MapError::Element)?;
         let is_length = period > 0.0 && (period / elements as f64).is_normal();
-        if !(is_length && (1..=MOST_ELEMENTS).contains(&elements)) {
+        if !(is_length && (1..=MAX_ELEMENTS).contains(&elements)) {
             return Err(MapError::Period { period, elements });
         }
         let period = Period { period, elements };
@@ -75,7 +75,7 @@ impl MapPlan {
 }
 
 /// The largest number of elements of a period: with more, a single cell would take minutes.
-const MOST_ELEMENTS: usize = 10_000_000;
+const MAX_ELEMENTS: usize = 10_000_000;
 
 /// Stops after the first increment, which solves the equations linearised at rest.
 const ONCE: Control = Control {

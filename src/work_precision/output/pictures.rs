@@ -7,7 +7,7 @@ use crate::work_precision::point::Measured;
 use crate::work_precision::{Curve, Measurements, Point};
 
 /// The value at which errors of zero are drawn: half an ulp.
-const LEAST: f64 = 0.5 * f64::EPSILON;
+const MIN: f64 = 0.5 * f64::EPSILON;
 
 impl Measurements {
     /// A chart of the error at the end (the larger one of coordinates and momenta) against cost, both logarithmic: a
@@ -21,13 +21,12 @@ impl Measurements {
             .y(self.errors(logarithmic("relative error at the end")))
             .size(900, 560);
         for curve in &self.curves {
-            let place = |one: &Measured| (one.cost(self.cost), larger(one.error(), LEAST));
+            let place = |one: &Measured| (one.cost(self.cost), larger(one.error(), MIN));
             let points = curve.measured().map(|(_, one)| place(one));
             chart = chart.series(self.name(curve), Style::LineWithMarkers, points);
         }
         for peer in &self.peers {
-            let place =
-                |one: &PeerMeasured| Some((one.cost(self.cost)?, larger(one.error(), LEAST)));
+            let place = |one: &PeerMeasured| Some((one.cost(self.cost)?, larger(one.error(), MIN)));
             let points = peer.points.iter().filter_map(PeerPoint::measured);
             let points: Vec<_> = points.filter_map(place).collect();
             if !points.is_empty() {
@@ -74,7 +73,7 @@ impl Measurements {
         if !errors().any(|error| error > LOST) {
             return axis;
         }
-        let least = errors().fold(LOST, f64::min).max(LEAST);
+        let least = errors().fold(LOST, f64::min).max(MIN);
         axis.range(0.5 * least.min(0.1 * LOST)..LOST)
     }
 
@@ -160,12 +159,11 @@ impl Measurements {
     fn below_reference(&self) -> Vec<(f64, f64)> {
         let ours = self.points().filter_map(Point::measured);
         let ours = ours.filter(|one| one.at_reference_floor);
-        let ours = ours.map(|one| (one.cost(self.cost), larger(one.error(), LEAST)));
+        let ours = ours.map(|one| (one.cost(self.cost), larger(one.error(), MIN)));
         let peers = self.peers.iter().flat_map(|peer| &peer.points);
         let peers = peers.filter_map(PeerPoint::measured);
         let peers = peers.filter(|one| one.at_reference_floor);
-        let peers =
-            peers.filter_map(|one| Some((one.cost(self.cost)?, larger(one.error(), LEAST))));
+        let peers = peers.filter_map(|one| Some((one.cost(self.cost)?, larger(one.error(), MIN))));
         ours.chain(peers).collect()
     }
 
@@ -177,7 +175,7 @@ impl Measurements {
             let Some((cost, _)) = self.place(point) else {
                 continue;
             };
-            let error = point.error().unwrap_or(LEAST).max(LEAST);
+            let error = point.error().unwrap_or(MIN).max(MIN);
             line.extend(last.map(|last| (cost, last)));
             line.push((cost, error));
             last = Some(error);

@@ -2,7 +2,7 @@
 
 use super::group::Row;
 use crate::precise::{add_exactly, exact_term};
-use crate::registers::pair::{Apart, Eight};
+use crate::registers::pair::{Eight, OutOfLine};
 use crate::registers::storage::{Heap, Matrix, Weights};
 
 /// The product of a K × K matrix with a vector over the points, for every coordinate that is requested.
@@ -14,7 +14,7 @@ pub(super) fn apply<V: Eight, const N: usize>(
     rows: &[Row<N>],
     products: &mut [Row<N>],
 ) {
-    like.apart(Product {
+    like.out_of_line(Product {
         matrix,
         wanted,
         rows,
@@ -30,7 +30,7 @@ struct Product<'a, const N: usize> {
     products: &'a mut [Row<N>],
 }
 
-impl<const N: usize> Apart for Product<'_, N> {
+impl<const N: usize> OutOfLine for Product<'_, N> {
     #[inline(always)]
     fn run<V: Eight>(mut self, like: V) {
         // Products with small tables are unrolled, with as many rows at once as their sums fit into registers.

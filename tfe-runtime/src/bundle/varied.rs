@@ -8,7 +8,7 @@ use crate::model::{CoordinateName, Facts, First, Form, Model, Second, State};
 use crate::points::constant_rates;
 use crate::precise::Precise;
 use crate::real::Real;
-use crate::registers::pair::{Apart, Eight, LANES};
+use crate::registers::pair::{Eight, LANES, OutOfLine};
 use crate::registers::side::Side;
 use alloc::vec::Vec;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -190,8 +190,8 @@ impl<V: Eight> Eight for Parametrised<'_, V> {
 
     /// The work does not depend on the model, and therefore needs no parameters.
     #[inline(always)]
-    fn apart<W: Apart>(self, work: W) {
-        self.value.apart(work);
+    fn out_of_line<W: OutOfLine>(self, work: W) {
+        self.value.out_of_line(work);
     }
 }
 

@@ -9,7 +9,7 @@ use crate::model::Form;
 
 /// The largest number of iterations of Newton's method for the velocity of a momentum; one suffices where the energy is
 /// quadratic in z.
-pub(crate) const MOST: u32 = 50;
+pub(crate) const MAX: u32 = 50;
 
 /// Whether these iterations end: the step is a rounding error of the solution, or it is small and no longer decreases.
 #[inline]
@@ -47,7 +47,7 @@ pub(crate) fn solve_velocity<const N: usize>(
     let pivots = &mut memory.pivots[..size];
     let (mut v, mut momentum) = (*guess, *p);
     let mut last = f64::INFINITY;
-    for _ in 0..MOST {
+    for _ in 0..MAX {
         matrix.fill(0.0);
         let (by_velocity, zz) = model.momentum_and_mass(t, q, &v, &mut momentum)?;
         border(matrix, &zz, rows, active);
@@ -79,7 +79,7 @@ pub(crate) fn solve_velocity<const N: usize>(
         last = step;
     }
     Err(LegendreError::Stalled {
-        iterations: MOST,
+        iterations: MAX,
         residual: last,
     }
     .into())

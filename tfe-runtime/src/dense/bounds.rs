@@ -1,7 +1,7 @@
 //! Bounds of the polynomials of an element: enclosures of all states inside it (T-128).
 
 use super::DenseElement;
-use crate::basis::{MAX_NODES, MOST_OF_INTEGRALS};
+use crate::basis::{INTEGRAL_BOUNDS, MAX_NODES};
 use crate::dual::Dual;
 use crate::enclosure::Enclosure;
 use crate::model::Form;
@@ -163,7 +163,7 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// and its values at the ends.
 fn along(others: impl Iterator<Item = f64>, ends: (f64, f64)) -> Enclosure {
     let mut radius = ROUNDING * (ends.0.abs() + ends.1.abs());
-    for (rate, most) in others.zip(&MOST_OF_INTEGRALS[1..]) {
+    for (rate, most) in others.zip(&INTEGRAL_BOUNDS[1..]) {
         radius += rate.abs() * most;
     }
     let (low, high) = (ends.0.min(ends.1), ends.0.max(ends.1));

@@ -9,7 +9,7 @@ use super::projection::Places;
 use super::rows::Rows;
 use super::transition::OperatorError;
 use crate::consistency::ModelError;
-use crate::constrained::node::{MOST, is_settled};
+use crate::constrained::node::{MAX, is_settled};
 use crate::error::{LegendreError, StepError};
 use crate::legendre::largest;
 use alloc::vec;
@@ -150,7 +150,7 @@ pub fn nearest<M: Model>(
     let mut rows = Rows::new(model);
     let mut matrix = Bordered::new(n, &rows).ok_or(ModelError::TooLarge)?;
     let (mut q, mut last, mut is_found) = (state.q.clone(), f64::INFINITY, false);
-    for _ in 0..MOST {
+    for _ in 0..MAX {
         rows.evaluate(model, t, &q);
         matrix.factor(&rows)?;
         let back = state.q.iter().zip(&q).map(|(given, q)| given - q);
@@ -171,7 +171,7 @@ pub fn nearest<M: Model>(
     }
     if !is_found {
         let stalled = LegendreError::Stalled {
-            iterations: MOST,
+            iterations: MAX,
             residual: last,
         };
         return Err(StepError::from(stalled).into());

@@ -12,7 +12,7 @@ use super::scale::Scale;
 use super::settling::Settling;
 #[cfg(feature = "sparse")]
 use super::settling::in_velocity;
-use super::space::{Kind, Leg, Problem};
+use super::space::{Kind, Problem, StepInput};
 use crate::consistency::ModelError;
 use crate::error::StepError;
 #[cfg(feature = "sparse")]
@@ -162,7 +162,7 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
         let yielding = cfg!(feature = "sparse") && solve != Solve::FixedPoint;
         self.prepare(t, h, is_warm);
         if solve != Solve::Newton && (!yielding || self.preference.is_fixed_point()) {
-            let leg = Leg {
+            let input = StepInput {
                 t,
                 h,
                 start: &self.start,
@@ -172,7 +172,7 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
                 &*self.model,
                 &self.problem,
                 (&self.control, yielding),
-                leg,
+                input,
                 &mut self.settling,
             );
             let iterations = u64::from(outcome.iterations);
@@ -203,14 +203,14 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
     }
 
     fn prepare(&mut self, t: f64, h: f64, is_warm: bool) {
-        let leg = Leg {
+        let input = StepInput {
             t,
             h,
             start: &self.start,
             low: &self.low,
         };
         self.registers
-            .prepare(&*self.model, &mut self.problem, leg, is_warm);
+            .prepare(&*self.model, &mut self.problem, input, is_warm);
     }
 
     #[cfg(not(feature = "sparse"))]
@@ -251,23 +251,23 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
             residual: f64::INFINITY,
             contraction: 1.0,
         };
-        let leg = Leg {
+        let input = StepInput {
             t,
             h,
             start: &self.start,
             low: &self.low,
         };
-        let scale = Scale::of(&self.problem, leg);
+        let scale = Scale::of(&self.problem, input);
         while outcome.iterations < self.control.max_iterations {
             if fresh {
                 let (q, z) = (&mut tangent.q[..], &mut tangent.z[..]);
-                self.registers.positions(&self.problem, leg, q, z);
+                self.registers.positions(&self.problem, input, q, z);
                 self.statistics.tangent_evaluations += points as u64;
                 tangent.factor(&*self.model, &scheme, &self.problem, t, h)?;
                 self.statistics.factorizations += 1;
             }
             self.registers
-                .rest(&*self.model, &self.problem, leg, &mut tangent.rest);
+                .rest(&*self.model, &self.problem, input, &mut tangent.rest);
             self.statistics.residual_evaluations += points as u64;
             tangent.solve();
             let sizes = self.registers.correct(&self.problem, &tangent.rest);
@@ -345,14 +345,14 @@ impl<M: Model, H: Deref<Target = M>> Forces<H> {
     }
 
     fn end(&mut self, t: f64, h: f64) -> bool {
-        let leg = Leg {
+        let input = StepInput {
             t,
             h,
             start: &self.start,
             low: &self.low,
         };
         self.registers
-            .end(&self.problem, leg, &mut self.end, &mut self.next_low)
+            .end(&self.problem, input, &mut self.end, &mut self.next_low)
     }
 
     /// The polynomial of the last step.

@@ -4,14 +4,14 @@ use super::blocked::{Blocked, Place};
 use super::model::{Gradient, Model};
 use super::pattern::Pattern;
 use super::rows::Rows;
-use crate::constrained::node::{MOST, is_settled};
+use crate::constrained::node::{MAX, is_settled};
 use crate::error::{ConstraintError, LegendreError, StepError};
 use crate::legendre::largest;
 use alloc::vec;
 use alloc::vec::Vec;
 
 /// The number of times a step is halved.
-const MOST_HALVINGS: u32 = 20;
+const MAX_HALVINGS: u32 = 20;
 
 /// How accurately a regular mass matrix has to reproduce a vector: if it is less accurate, the constraints determine
 /// the velocities better than the momenta do.
@@ -78,7 +78,7 @@ impl Node {
     ) -> Result<(), StepError> {
         let n = z.len();
         let mut last = f64::INFINITY;
-        for _ in 0..MOST {
+        for _ in 0..MAX {
             self.slope(model, t, q, z);
             self.factor(model, (t, q, z), rows)?;
             for a in 0..n {
@@ -107,7 +107,7 @@ impl Node {
             last = step;
         }
         Err(LegendreError::Stalled {
-            iterations: MOST,
+            iterations: MAX,
             residual: last,
         }
         .into())
@@ -183,7 +183,7 @@ impl Node {
         };
         let before = distance(self);
         let mut fraction = 1.0;
-        for _ in 0..MOST_HALVINGS {
+        for _ in 0..MAX_HALVINGS {
             for (z, step) in z.iter_mut().zip(&self.vector[..n]) {
                 *z += fraction * step;
             }

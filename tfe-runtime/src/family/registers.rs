@@ -5,7 +5,7 @@ use super::model::FamilyState;
 use super::running::{Passes, Place, Running};
 use super::scale::Scale;
 use super::settling::{Settling, in_velocity};
-use super::space::{Kind, Leg, Pass, Problem, Sizes, Space};
+use super::space::{Kind, Pass, Problem, Sizes, Space, StepInput};
 use crate::lanes::Lanes;
 use crate::newton::{Control, Monitor, PATIENCE, Verdict};
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -45,18 +45,18 @@ impl Registers {
         &mut self,
         kernel: &dyn Kernel,
         problem: &mut Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         is_warm: bool,
     ) {
-        problem.begin(leg);
+        problem.begin(input);
         if !is_warm {
-            self.run(Pass::Stand, problem, leg);
+            self.run(Pass::Stand, problem, input);
             // The forces at the start, at all points.
-            let standing = Leg { h: 0.0, ..leg };
+            let standing = StepInput { h: 0.0, ..input };
             self.evaluate(kernel, problem, standing, 0, false);
-            self.run(Pass::Spread, problem, leg);
+            self.run(Pass::Spread, problem, input);
         }
-        self.run(Pass::Begin { is_warm }, problem, leg);
+        self.run(Pass::Begin { is_warm }, problem, input);
     }
 
     /// The fixed-point iteration; with `yielding` it gives up as soon as Newton's method is cheaper.
@@ -65,7 +65,7 @@ impl Registers {
         kernel: &dyn Kernel,
         problem: &Problem,
         (control, yielding): (&Control, bool),
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         settling: &mut Settling,
     ) -> Outcome {
         let mut monitor = Monitor::of_fixed_point(control.tolerance);
@@ -75,18 +75,18 @@ impl Registers {
         } else {
             control.max_iterations
         };
-        let scale = Scale::of(problem, leg);
+        let scale = Scale::of(problem, input);
         while iterations < most {
             if settles {
                 self.copy_forces(problem, &mut settling.before);
             }
             let mut sizes = Sizes::NONE;
             for group in 0..problem.tables.groups {
-                sizes = sizes.and(self.evaluate(kernel, problem, leg, group, true));
+                sizes = sizes.and(self.evaluate(kernel, problem, input, group, true));
             }
             iterations += 1;
             let verdict = if settles {
-                let own = self.own_increment(problem, leg.h, settling);
+                let own = self.own_increment(problem, input.h, settling);
                 own.map_or(Ok(Verdict::Converged), |own| monitor.settle(own))
             } else {
                 monitor.judge(scale.increment(sizes))
@@ -95,7 +95,7 @@ impl Registers {
                 Ok(Verdict::Converged)
                     if !settles
                         && !control.is_rough()
-                        && self.has_small(problem, leg.h, settling) =>
+                        && self.has_small(problem, input.h, settling) =>
                 {
                     settles = true;
                     monitor.begin_to_settle();
@@ -163,13 +163,13 @@ impl Registers {
         &mut self,
         kernel: &dyn Kernel,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         rest: &mut [f64],
     ) {
         for group in 0..problem.tables.groups {
-            self.run(Pass::Place { group }, problem, leg);
-            self.evaluate(kernel, problem, leg, group, false);
-            self.run(Pass::Rest { group, rest }, problem, leg);
+            self.run(Pass::Place { group }, problem, input);
+            self.evaluate(kernel, problem, input, group, false);
+            self.run(Pass::Rest { group, rest }, problem, input);
         }
     }
 
@@ -178,12 +178,12 @@ impl Registers {
     pub(super) fn positions(
         &mut self,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         q: &mut [f64],
         z: &mut [f64],
     ) {
         for group in 0..problem.tables.groups {
-            self.run(Pass::Place { group }, problem, leg);
+            self.run(Pass::Place { group }, problem, input);
             match self {
                 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
                 Self::Quads(space, _) => space.positions(&problem.tables, group, q, z),
@@ -217,11 +217,11 @@ impl Registers {
     pub(super) fn end(
         &mut self,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         end: &mut FamilyState,
         low: &mut FamilyState,
     ) -> bool {
-        self.run(Pass::End { end, low }, problem, leg).size == 0.0
+        self.run(Pass::End { end, low }, problem, input).size == 0.0
     }
 
     /// L_q + Q at one point of the last step.
@@ -239,14 +239,14 @@ impl Registers {
         &mut self,
         kernel: &dyn Kernel,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         group: usize,
         settles: bool,
     ) -> Sizes {
-        let times = problem.tables.nodes[group].map(|node| leg.t + leg.h * node);
+        let times = problem.tables.nodes[group].map(|node| input.t + input.h * node);
         let place = Place {
             problem,
-            leg,
+            input,
             group,
             settles,
         };
@@ -265,11 +265,11 @@ impl Registers {
         }
     }
 
-    fn run(&mut self, pass: Pass<'_>, problem: &Problem, leg: Leg<'_>) -> Sizes {
+    fn run(&mut self, pass: Pass<'_>, problem: &Problem, input: StepInput<'_>) -> Sizes {
         match self {
             #[cfg(all(feature = "simd", target_arch = "x86_64"))]
-            Self::Quads(space, isa) => isa.run(pass, space, problem, leg),
-            Self::Lanes(space) => ().run(pass, space, problem, leg),
+            Self::Quads(space, isa) => isa.run(pass, space, problem, input),
+            Self::Lanes(space) => ().run(pass, space, problem, input),
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A kernel of run-time length that runs through its sites, followed closely by the passes of the iteration.
 
 use super::model::{Gradient, Sweep};
-use super::space::{Leg, Pass, Problem, Sizes, Space};
+use super::space::{Pass, Problem, Sizes, Space, StepInput};
 use crate::lanes::Lanes;
 use crate::registers::four::Four;
 #[cfg(all(feature = "simd", target_arch = "x86_64"))]
@@ -9,7 +9,13 @@ use crate::registers::quad::Quad;
 
 /// Runs passes, compiled for one instruction set.
 pub(super) trait Passes<V>: Copy {
-    fn run(self, pass: Pass<'_>, space: &mut Space<V>, problem: &Problem, leg: Leg<'_>) -> Sizes;
+    fn run(
+        self,
+        pass: Pass<'_>,
+        space: &mut Space<V>,
+        problem: &Problem,
+        input: StepInput<'_>,
+    ) -> Sizes;
 }
 
 impl Passes<Lanes<4>> for () {
@@ -18,9 +24,9 @@ impl Passes<Lanes<4>> for () {
         pass: Pass<'_>,
         space: &mut Space<Lanes<4>>,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
     ) -> Sizes {
-        pass.run(space, problem, leg)
+        pass.run(space, problem, input)
     }
 }
 
@@ -31,12 +37,12 @@ impl Passes<Quad> for pulp::x86::V3 {
         pass: Pass<'_>,
         space: &mut Space<Quad>,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
     ) -> Sizes {
         self.vectorize(InRegisters {
             space,
             problem,
-            leg,
+            input,
             pass,
         })
     }
@@ -46,7 +52,7 @@ impl Passes<Quad> for pulp::x86::V3 {
 #[derive(Clone, Copy)]
 pub(super) struct Place<'a> {
     pub(super) problem: &'a Problem,
-    pub(super) leg: Leg<'a>,
+    pub(super) input: StepInput<'a>,
     pub(super) group: usize,
     pub(super) settles: bool,
 }
@@ -88,7 +94,7 @@ impl<V: Four, P: Passes<V>> Sweep<V> for Running<'_, V, P> {
     fn passed(&mut self, below: usize) {
         let Place {
             problem,
-            leg,
+            input,
             group,
             settles,
         } = self.place;
@@ -97,7 +103,7 @@ impl<V: Four, P: Passes<V>> Sweep<V> for Running<'_, V, P> {
         }
         let range = self.settled..below;
         let pass = Pass::Settle { group, range };
-        let sizes = self.passes.run(pass, self.space, problem, leg);
+        let sizes = self.passes.run(pass, self.space, problem, input);
         self.sizes = self.sizes.and(sizes);
         self.settled = below;
     }
@@ -108,7 +114,7 @@ impl<V: Four, P: Passes<V>> Sweep<V> for Running<'_, V, P> {
 struct InRegisters<'a> {
     space: &'a mut Space<Quad>,
     problem: &'a Problem,
-    leg: Leg<'a>,
+    input: StepInput<'a>,
     pass: Pass<'a>,
 }
 
@@ -118,6 +124,6 @@ impl pulp::NullaryFnOnce for InRegisters<'_> {
 
     #[inline(always)]
     fn call(self) -> Sizes {
-        self.pass.run(self.space, self.problem, self.leg)
+        self.pass.run(self.space, self.problem, self.input)
     }
 }

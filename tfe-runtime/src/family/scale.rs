@@ -1,6 +1,6 @@
 //! The sizes to which increments of the iteration of models of run-time length are compared.
 
-use super::space::{Leg, Problem, Sizes};
+use super::space::{Problem, Sizes, StepInput};
 use crate::equations::Increment;
 use crate::legendre::largest;
 
@@ -13,10 +13,10 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    pub(super) fn of(problem: &Problem, leg: Leg<'_>) -> Self {
+    pub(super) fn of(problem: &Problem, input: StepInput<'_>) -> Self {
         Self {
-            h: leg.h,
-            q: largest(&leg.start.q),
+            h: input.h,
+            q: largest(&input.start.q),
             velocity: largest(&problem.velocity),
         }
     }

@@ -74,7 +74,7 @@ pub(super) struct Space<V> {
 
 /// The time, length and start of a step.
 #[derive(Clone, Copy)]
-pub(super) struct Leg<'a> {
+pub(super) struct StepInput<'a> {
     pub(super) t: f64,
     pub(super) h: f64,
     pub(super) start: &'a FamilyState,
@@ -138,13 +138,13 @@ impl Pass<'_> {
         self,
         space: &mut Space<V>,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
     ) -> Sizes {
         match problem.tables.groups {
-            1 => self.run_for::<V, 1>(space, problem, leg),
-            2 => self.run_for::<V, 2>(space, problem, leg),
-            3 => self.run_for::<V, 3>(space, problem, leg),
-            _ => self.run_for::<V, MAX_GROUPS>(space, problem, leg),
+            1 => self.run_for::<V, 1>(space, problem, input),
+            2 => self.run_for::<V, 2>(space, problem, input),
+            3 => self.run_for::<V, 3>(space, problem, input),
+            _ => self.run_for::<V, MAX_GROUPS>(space, problem, input),
         }
     }
 
@@ -153,23 +153,23 @@ impl Pass<'_> {
         self,
         space: &mut Space<V>,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
     ) -> Sizes {
         match self {
-            Pass::Stand => space.stand(problem, leg),
+            Pass::Stand => space.stand(problem, input),
             Pass::Spread => space.spread(),
-            Pass::Begin { is_warm } => space.begin::<G>(problem, leg, is_warm),
+            Pass::Begin { is_warm } => space.begin::<G>(problem, input, is_warm),
             #[cfg(feature = "sparse")]
-            Pass::Place { group } => space.place::<G>(problem, leg, group),
+            Pass::Place { group } => space.place::<G>(problem, input, group),
             Pass::Settle { group, range } if space.kind.forced => {
-                return space.settle::<G, true>(problem, leg, group, range);
+                return space.settle::<G, true>(problem, input, group, range);
             }
             Pass::Settle { group, range } => {
-                return space.settle::<G, false>(problem, leg, group, range);
+                return space.settle::<G, false>(problem, input, group, range);
             }
             #[cfg(feature = "sparse")]
             Pass::Rest { group, rest } => space.rest(&problem.tables, group, rest),
-            Pass::End { end, low } => return space.end(problem, leg, end, low),
+            Pass::End { end, low } => return space.end(problem, input, end, low),
         }
         Sizes::NONE
     }
@@ -297,14 +297,14 @@ impl<V: Four> Space<V> {
     }
 
     #[inline(always)]
-    fn stand(&mut self, problem: &Problem, leg: Leg<'_>) {
+    fn stand(&mut self, problem: &Problem, input: StepInput<'_>) {
         let like = self.like;
         let z = match self.kind.form {
             Form::Lagrangian => &problem.velocity,
-            Form::Hamiltonian => &leg.start.p,
+            Form::Hamiltonian => &input.start.p,
         };
         for a in 0..self.n {
-            self.q[a] = like.like(leg.start.q[a]);
+            self.q[a] = like.like(input.start.q[a]);
             self.z[a] = like.like(z[a]);
         }
     }
@@ -344,13 +344,13 @@ impl<V: Four> Space<V> {
     }
 
     #[inline(always)]
-    fn begin<const G: usize>(&mut self, problem: &Problem, leg: Leg<'_>, is_warm: bool) {
+    fn begin<const G: usize>(&mut self, problem: &Problem, input: StepInput<'_>, is_warm: bool) {
         let (like, n) = (self.like, self.n);
-        let h = like.like(leg.h);
+        let h = like.like(input.h);
         let continued = rows::<V, G>(like, problem.tables.continued());
         let low_rows = rows::<V, G>(like, &problem.tables.twice_low);
         let rows = rows::<V, G>(like, &problem.tables.twice);
-        let first = Placement::<V, G>::of(like, &problem.tables, leg.h, 0);
+        let first = Placement::<V, G>::of(like, &problem.tables, input.h, 0);
         let forces = &mut self.forces[..G * n];
         let drift = &mut self.drift[..G * n];
         let (inverse, inverse_low) = (
@@ -358,7 +358,7 @@ impl<V: Four> Space<V> {
             &problem.inertia.inverse_low[..n],
         );
         let (velocity, velocity_low) = (&problem.velocity[..n], &problem.velocity_low[..n]);
-        let (start, low_q) = (&leg.start.q[..n], &leg.low.q[..n]);
+        let (start, low_q) = (&input.start.q[..n], &input.low.q[..n]);
         let q = &mut self.q[..n];
         for a in 0..n {
             if is_warm {
@@ -384,7 +384,7 @@ impl<V: Four> Space<V> {
             q[a] = first.position(start[a], drift[a], &accelerations);
         }
         if self.kind.forced {
-            self.place_rates(problem, leg, &first, 0..n);
+            self.place_rates(problem, input, &first, 0..n);
         }
     }
 
@@ -392,7 +392,7 @@ impl<V: Four> Space<V> {
     fn settle<const G: usize, const FORCED: bool>(
         &mut self,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         group: usize,
         range: Range<usize>,
     ) -> Sizes {
@@ -402,8 +402,8 @@ impl<V: Four> Space<V> {
         // With several groups, later ones use the forces of this iteration at the points of earlier ones
         // (Gauss–Seidel); the fixed point is the same.
         let next = (group + 1) % G;
-        let placement = Placement::<V, G>::of(like, &problem.tables, leg.h, next);
-        let start = &leg.start.q[..n];
+        let placement = Placement::<V, G>::of(like, &problem.tables, input.h, next);
+        let start = &input.start.q[..n];
         let inverse = &problem.inertia.inverse[..n];
         let by_q = &mut self.by_q[..n];
         let forced = &mut self.force[..if FORCED { n } else { 0 }];
@@ -429,7 +429,7 @@ impl<V: Four> Space<V> {
             q[a] = placement.position(start[a], drift[a], &accelerations);
         }
         if FORCED {
-            self.place_rates(problem, leg, &placement, range);
+            self.place_rates(problem, input, &placement, range);
         }
         Sizes {
             changed: changed.get(),
@@ -439,10 +439,10 @@ impl<V: Four> Space<V> {
 
     #[cfg(feature = "sparse")]
     #[inline(always)]
-    fn place<const G: usize>(&mut self, problem: &Problem, leg: Leg<'_>, group: usize) {
+    fn place<const G: usize>(&mut self, problem: &Problem, input: StepInput<'_>, group: usize) {
         let (like, n) = (self.like, self.n);
-        let placement = Placement::<V, G>::of(like, &problem.tables, leg.h, group);
-        let start = &leg.start.q[..n];
+        let placement = Placement::<V, G>::of(like, &problem.tables, input.h, group);
+        let start = &input.start.q[..n];
         let inverse = &problem.inertia.inverse[..n];
         let drift = &self.drift[group * n..][..n];
         let forces = &self.forces[..G * n];
@@ -451,7 +451,7 @@ impl<V: Four> Space<V> {
             self.q[a] = placement.position(start[a], drift[a], &accelerations);
         }
         if self.kind.forced {
-            self.place_rates(problem, leg, &placement, 0..n);
+            self.place_rates(problem, input, &placement, 0..n);
         }
     }
 
@@ -460,7 +460,7 @@ impl<V: Four> Space<V> {
     fn place_rates<const G: usize>(
         &mut self,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         placement: &Placement<V, G>,
         range: Range<usize>,
     ) {
@@ -476,7 +476,7 @@ impl<V: Four> Space<V> {
                 }
             }
             Form::Hamiltonian => {
-                let start = &leg.start.p[..n];
+                let start = &input.start.p[..n];
                 for a in range {
                     let rates = at_points::<V, G>(forces, n, a, like.like(1.0));
                     z[a] = placement.rate(start[a], &rates);
@@ -491,12 +491,12 @@ impl<V: Four> Space<V> {
     fn end(
         &self,
         problem: &Problem,
-        leg: Leg<'_>,
+        input: StepInput<'_>,
         end: &mut FamilyState,
         low: &mut FamilyState,
     ) -> Sizes {
         let (like, n) = (self.like, self.n);
-        let h = like.like(leg.h);
+        let h = like.like(input.h);
         let inertia = &problem.inertia;
         let mut zero = like.like(0.0);
         for at in (0..n).step_by(4) {
@@ -511,9 +511,15 @@ impl<V: Four> Space<V> {
                 block(like, &problem.velocity_low, at),
             );
             let velocity = moved::<_, true>(h, (acceleration, rest), start);
-            let start = (block(like, &leg.start.q, at), block(like, &leg.low.q, at));
+            let start = (
+                block(like, &input.start.q, at),
+                block(like, &input.low.q, at),
+            );
             let (q, q_low) = moved::<_, true>(h, velocity, start);
-            let start = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
+            let start = (
+                block(like, &input.start.p, at),
+                block(like, &input.low.p, at),
+            );
             let (p, p_low) = moved::<_, true>(h, force, start);
             // Zero times a number that is not finite is NaN.
             zero += (q + p) * like.like(0.0);
@@ -579,13 +585,13 @@ impl Kind {
 
 impl Problem {
     /// Computes the velocity at the start, and the contributions of the low words.
-    pub(super) fn begin(&mut self, leg: Leg<'_>) {
+    pub(super) fn begin(&mut self, input: StepInput<'_>) {
         for (a, mass) in self.inertia.mass.iter().enumerate() {
-            let p = leg.start.p[a];
+            let p = input.start.p[a];
             // No floating-point velocity belongs exactly to the momentum; the remainder becomes the low word.
             let v = p / mass;
             let rest = DoubleDouble::product(v, *mass);
-            let missing = leg.low.p[a] + DoubleDouble::new(p).minus(rest).high;
+            let missing = input.low.p[a] + DoubleDouble::new(p).minus(rest).high;
             self.velocity[a] = v;
             self.velocity_low[a] = missing / mass;
         }

@@ -1,6 +1,6 @@
 //! The end of an element, in more than working precision where that is requested.
 
-use super::{Leg, Work};
+use super::{StepInput, Work};
 use crate::model::{Model, State};
 use crate::precise::Precise;
 use crate::registers::four::{Four, block, put};
@@ -12,21 +12,27 @@ impl<const N: usize, S: Storage> Work<N, S> {
     pub(super) fn finish<V: Four, const EXACT: bool>(
         &self,
         like: V,
-        leg: &Leg<'_, N, S>,
+        input: &StepInput<'_, N, S>,
         (end, end_low): (&mut State<N>, &mut State<N>),
     ) {
-        let (weights, h) = (&leg.tables.weights, like.like(leg.h));
+        let (weights, h) = (&input.tables.weights, like.like(input.h));
         if const { matches!(N, 1 | 2) } {
             let forces = (weights, &*self.forces);
             let rates = weights.sums_beside::<_, N, EXACT>(like, &self.rates, forces);
-            (*end, *end_low) = apart(moved::<_, EXACT>(h, rates, leg.both(like)));
+            (*end, *end_low) = unpacked(moved::<_, EXACT>(h, rates, input.both(like)));
             return;
         }
         for at in (0..N).step_by(4) {
             let velocity = weights.sums::<_, N, EXACT>(like, &self.rates, at);
             let force = weights.sums::<_, N, EXACT>(like, &self.forces, at);
-            let q = (block(like, &leg.start.q, at), block(like, &leg.low.q, at));
-            let p = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
+            let q = (
+                block(like, &input.start.q, at),
+                block(like, &input.low.q, at),
+            );
+            let p = (
+                block(like, &input.start.p, at),
+                block(like, &input.low.p, at),
+            );
             let (q, q_low) = moved::<_, EXACT>(h, velocity, q);
             let (p, p_low) = moved::<_, EXACT>(h, force, p);
             put(q, &mut end.q, at);
@@ -41,23 +47,23 @@ impl<const N: usize, S: Storage> Work<N, S> {
     pub(super) fn finish_second_order<V: Four, M, const EXACT: bool>(
         &self,
         like: V,
-        leg: &Leg<'_, N, S>,
+        input: &StepInput<'_, N, S>,
         (end, end_low): (&mut State<N>, &mut State<N>),
     ) where
         M: Model<N>,
     {
-        let (tables, h) = (leg.tables, like.like(leg.h));
+        let (tables, h) = (input.tables, like.like(input.h));
         if const { matches!(N, 1 | 2) } {
             // Σ (bᵀA) f beside Σ b f; the contributions of the latter to the velocities are not needed here.
             let force = (&tables.weights, &*self.forces);
             let sums = (tables.lever).sums_beside::<_, N, EXACT>(like, &self.forces, force);
             let mut lever = sums;
-            if !leg.inertia.is_diagonal::<M>() {
-                let (State { q, .. }, State { q: q_low, .. }) = apart(sums);
-                let (high, low) = leg.inertia.of_both(&q, &q_low);
+            if !input.inertia.is_diagonal::<M>() {
+                let (State { q, .. }, State { q: q_low, .. }) = unpacked(sums);
+                let (high, low) = input.inertia.of_both(&q, &q_low);
                 lever = (block(like, &high, 0), block(like, &low, 0));
             }
-            let acceleration = self.accelerations::<_, M, EXACT>(like, leg, lever, 0);
+            let acceleration = self.accelerations::<_, M, EXACT>(like, input, lever, 0);
             let v = (
                 block(like, &self.velocity, 0),
                 block(like, &self.velocity_low, 0),
@@ -67,7 +73,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
                 first_of::<_, N>(velocity.0, sums.0),
                 first_of::<_, N>(velocity.1, sums.1),
             );
-            (*end, *end_low) = apart(moved::<_, EXACT>(h, rates, leg.both(like)));
+            (*end, *end_low) = unpacked(moved::<_, EXACT>(h, rates, input.both(like)));
             return;
         }
         let (mut lever, mut lever_low) = ([0.0; N], [0.0; N]);
@@ -77,19 +83,25 @@ impl<const N: usize, S: Storage> Work<N, S> {
             put(sum, &mut lever, at);
             put(low, &mut lever_low, at);
         }
-        if !leg.inertia.is_diagonal::<M>() {
-            (lever, lever_low) = leg.inertia.of_both(&lever, &lever_low);
+        if !input.inertia.is_diagonal::<M>() {
+            (lever, lever_low) = input.inertia.of_both(&lever, &lever_low);
         }
         for at in (0..N).step_by(4) {
             let lever = (block(like, &lever, at), block(like, &lever_low, at));
-            let acceleration = self.accelerations::<_, M, EXACT>(like, leg, lever, at);
+            let acceleration = self.accelerations::<_, M, EXACT>(like, input, lever, at);
             let force = tables.weights.sums::<_, N, EXACT>(like, forces, at);
             let v = (
                 block(like, &self.velocity, at),
                 block(like, &self.velocity_low, at),
             );
-            let q = (block(like, &leg.start.q, at), block(like, &leg.low.q, at));
-            let p = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
+            let q = (
+                block(like, &input.start.q, at),
+                block(like, &input.low.q, at),
+            );
+            let p = (
+                block(like, &input.start.p, at),
+                block(like, &input.low.p, at),
+            );
             let (q, q_low) = moved::<_, EXACT>(h, moved::<_, EXACT>(h, acceleration, v), q);
             let (p, p_low) = moved::<_, EXACT>(h, force, p);
             put(q, &mut end.q, at);
@@ -105,14 +117,14 @@ impl<const N: usize, S: Storage> Work<N, S> {
     fn accelerations<V: Four, M, const EXACT: bool>(
         &self,
         like: V,
-        leg: &Leg<'_, N, S>,
+        input: &StepInput<'_, N, S>,
         forces: (V, V),
         at: usize,
     ) -> (V, V)
     where
         M: Model<N>,
     {
-        let inertia = leg.inertia;
+        let inertia = input.inertia;
         if !inertia.is_diagonal::<M>() {
             return forces;
         }
@@ -127,7 +139,7 @@ impl<const N: usize, S: Storage> Work<N, S> {
     }
 }
 
-impl<const N: usize, S: Storage> Leg<'_, N, S> {
+impl<const N: usize, S: Storage> StepInput<'_, N, S> {
     /// The start and its rounding error, with coordinates beside momenta.
     #[inline(always)]
     fn both<V: Four>(&self, like: V) -> (V, V) {
@@ -164,7 +176,7 @@ fn first_of<V: Four, const N: usize>(one: V, other: V) -> V {
 
 /// States from values that are side by side.
 #[inline(always)]
-fn apart<V: Four, const N: usize>((high, low): (V, V)) -> (State<N>, State<N>) {
+fn unpacked<V: Four, const N: usize>((high, low): (V, V)) -> (State<N>, State<N>) {
     let (mut end, mut end_low) = (State::ZERO, State::ZERO);
     let (high, low) = (high.lanes(), low.lanes());
     for a in 0..N {

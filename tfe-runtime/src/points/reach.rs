@@ -1,7 +1,7 @@
 //! The reach of a step: boxes that contain its polynomials, computed from the values at its points at much less cost
 //! than the polynomials (T-155).
 
-use crate::basis::{MAX_RATES, MOST_OF_INTEGRALS};
+use crate::basis::{INTEGRAL_BOUNDS, MAX_RATES};
 use crate::model::{Form, Model, State};
 use crate::points::Points;
 use crate::points::forms::is_second_order;
@@ -58,7 +58,7 @@ impl Weights {
             for m in 0..scheme.rates().min(MAX_RATES) {
                 let at = m * points + l;
                 let size = scheme.rate[at].abs().max(scheme.force_rate[at].abs());
-                part[0] += size * MOST_OF_INTEGRALS[m];
+                part[0] += size * INTEGRAL_BOUNDS[m];
                 part[1] += size;
             }
             for row in scheme.position.chunks_exact(points) {

@@ -2,7 +2,7 @@
 
 use super::evaluation::{Evaluation, FEW, Placed};
 use super::forms::{acting, is_phase, is_second_order};
-use super::{Leg, Outcome, Points, Together, Work};
+use super::{StepInput, Outcome, Points, Together, Work};
 use super::{is_finite, largest};
 use crate::error::StepError;
 use crate::method::{Last, Memory};
@@ -64,7 +64,7 @@ where
             return isa.vectorize(InRegisters { job: self, isa });
         }
         let (of, memory) = ((self.model, self.asked), self.memory);
-        step_apart(self.points, of, self.tables, memory, self.place, self.state)
+        step_out_of_line(self.points, of, self.tables, memory, self.place, self.state)
     }
 
     /// The whole step.
@@ -138,7 +138,7 @@ where
 /// A step without wide registers. Not inlined, because it has several callers; its arguments are passed one by one, so
 /// that they need not be in memory.
 #[inline(never)]
-fn step_apart<M, T, A, S: Storage, const N: usize>(
+fn step_out_of_line<M, T, A, S: Storage, const N: usize>(
     points: &mut Points<N, S>,
     (model, asked): (&M, &A),
     tables: &T,
@@ -211,7 +211,7 @@ where
         if const { is_second_order::<M, N>() } {
             points.inertia.set_step::<M, _>(like, self.place.1);
         }
-        let mut leg = Leg {
+        let mut input = StepInput {
             t: self.place.0,
             h: self.place.1,
             start: self.start.0,
@@ -225,12 +225,12 @@ where
             },
             force_factors: [1.0; N],
         };
-        work.distance = largest(&leg.start.q);
+        work.distance = largest(&input.start.q);
         if const { is_second_order::<M, N>() } {
-            work.begin_second_order::<_, M>(like, &leg);
+            work.begin_second_order::<_, M>(like, &input);
             work.speed = largest(&work.velocity);
         } else {
-            work.speed = largest(&leg.start.p);
+            work.speed = largest(&input.start.p);
         }
         let is_rough = control.is_rough();
         let mut monitor = Monitor::of_fixed_point(control.tolerance);
@@ -243,14 +243,14 @@ where
         // Whether the increments of small coordinates are compared with these.
         let mut settles = false;
         if const { is_second_order::<M, N>() } {
-            work.integrate_twice::<_, M>(like, &leg);
+            work.integrate_twice::<_, M>(like, &input);
             if is_rough {
-                work.accelerated().set_drift::<_, _, M>(like, &leg);
+                work.accelerated().set_drift::<_, _, M>(like, &input);
             } else {
-                work.accelerated().set_exact_drift::<_, _, M>(like, &leg);
+                work.accelerated().set_exact_drift::<_, _, M>(like, &input);
             }
         } else if !is_rough {
-            work.rows().set_low::<_, _, M>(like, &leg);
+            work.rows().set_low::<_, _, M>(like, &input);
         }
         let mut new_place = None;
         let at = match points.places.kept() {
@@ -261,11 +261,11 @@ where
             while iterations < most {
                 // The conditions are constants, so that only one of the three iterations is compiled.
                 let increment = if const { is_second_order::<M, N>() } {
-                    work.sweep_second_order::<V, M>(like, model, &leg, at)
+                    work.sweep_second_order::<V, M>(like, model, &input, at)
                 } else if const { is_phase::<M, N>() } {
-                    work.sweep_phase::<V, M>(like, model, &leg, at, (iterations == 0, refresh))
+                    work.sweep_phase::<V, M>(like, model, &input, at, (iterations == 0, refresh))
                 } else {
-                    work.sweep_velocity::<V, M>(like, model, &leg, at, refresh)
+                    work.sweep_velocity::<V, M>(like, model, &input, at, refresh)
                 };
                 iterations += 1;
                 let verdict = if settles {
@@ -290,18 +290,18 @@ where
                     break;
                 }
                 if const { is_second_order::<M, N>() } {
-                    work.integrate_twice::<_, M>(like, &leg);
+                    work.integrate_twice::<_, M>(like, &input);
                 }
             }
             let of = &points.declarations;
             let may_settle = const { N > 1 } && of.are_several && !is_rough && !settles;
-            if !(converged && may_settle && leg.weigh::<M>(work, of)) {
+            if !(converged && may_settle && input.weigh::<M>(work, of)) {
                 break;
             }
             (settles, converged) = (true, false);
             monitor.begin_to_settle();
             if const { is_second_order::<M, N>() } {
-                work.integrate_twice::<_, M>(like, &leg);
+                work.integrate_twice::<_, M>(like, &input);
             }
         }
         converged |= monitor.is_at_round_off();
@@ -312,14 +312,14 @@ where
             let place = (&mut end.0, &mut end.1);
             if const { is_second_order::<M, N>() } {
                 if is_rough {
-                    work.finish_second_order::<V, M, false>(like, &leg, place);
+                    work.finish_second_order::<V, M, false>(like, &input, place);
                 } else {
-                    work.finish_second_order::<V, M, true>(like, &leg, place);
+                    work.finish_second_order::<V, M, true>(like, &input, place);
                 }
             } else if is_rough {
-                work.finish::<V, false>(like, &leg, place);
+                work.finish::<V, false>(like, &input, place);
             } else {
-                work.finish::<V, true>(like, &leg, place);
+                work.finish::<V, true>(like, &input, place);
             }
             if is_finite(&end.0) {
                 // Until here the old forces are kept, because a failed step would have to start from them.

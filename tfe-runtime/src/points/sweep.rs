@@ -6,7 +6,7 @@ use super::first_order::Rows;
 use super::forms::acting;
 use super::inertia::Inertia;
 use super::second_order::{Forces, velocity_of};
-use super::{LEAST, Leg, Row, Work};
+use super::{MIN_SIZE, Row, StepInput, Work};
 use crate::equations::Increment;
 use crate::legendre::larger;
 use crate::model::{First, Model};
@@ -32,7 +32,7 @@ fn beside(h: f64, start: f64, x: f64, change: f64) -> f64 {
 }
 
 /// Four points of a trajectory.
-impl<V: Four, const N: usize, S: Storage> Arrangement<V, 4, N> for Leg<'_, N, S> {
+impl<V: Four, const N: usize, S: Storage> Arrangement<V, 4, N> for StepInput<'_, N, S> {
     type Memory = S;
     type Number = f64;
     type Entry = [f64; 4];
@@ -173,14 +173,17 @@ impl<const N: usize, S: Storage> Work<N, S> {
 
     /// Computes the velocity at the start, and its rounding error.
     #[inline(always)]
-    pub(super) fn begin_second_order<V: Four, M>(&mut self, like: V, leg: &Leg<'_, N, S>)
+    pub(super) fn begin_second_order<V: Four, M>(&mut self, like: V, input: &StepInput<'_, N, S>)
     where
         M: Model<N>,
     {
-        let inertia = &leg.inertia;
+        let inertia = &input.inertia;
         if inertia.is_diagonal::<M>() {
             for at in (0..N).step_by(4) {
-                let p = (block(like, &leg.start.p, at), block(like, &leg.low.p, at));
+                let p = (
+                    block(like, &input.start.p, at),
+                    block(like, &input.low.p, at),
+                );
                 let inverse = block(like, &inertia.inverse_diagonal, at);
                 let mass = block(like, &inertia.masses, at);
                 let (v, v_low) = velocity_of(p, mass, inverse);
@@ -192,8 +195,8 @@ impl<const N: usize, S: Storage> Work<N, S> {
         for (a, row) in inertia.inverse.iter().enumerate() {
             let (mut v, mut low) = (0.0, 0.0);
             for b in 0..N {
-                v += row[b] * leg.start.p[b];
-                low += row[b] * leg.low.p[b];
+                v += row[b] * input.start.p[b];
+                low += row[b] * input.low.p[b];
             }
             (self.velocity[a], self.velocity_low[a]) = (v, low);
         }
@@ -201,12 +204,12 @@ impl<const N: usize, S: Storage> Work<N, S> {
 
     /// A² f
     #[inline(always)]
-    pub(super) fn integrate_twice<V: Four, M>(&mut self, like: V, leg: &Leg<'_, N, S>)
+    pub(super) fn integrate_twice<V: Four, M>(&mut self, like: V, input: &StepInput<'_, N, S>)
     where
         M: Model<N>,
     {
         let acting = &const { acting::<M, N>() };
-        (leg.tables.twice).apply(like, acting, &self.forces, &mut self.products);
+        (input.tables.twice).apply(like, acting, &self.forces, &mut self.products);
     }
 
     /// One iteration for the forces of M q̈ = f.
@@ -215,15 +218,15 @@ impl<const N: usize, S: Storage> Work<N, S> {
         &mut self,
         like: V,
         model: &M,
-        leg: &Leg<'_, N, S>,
+        input: &StepInput<'_, N, S>,
         at: &mut Evaluation<V, N>,
     ) -> Increment
     where
         M: Model<N>,
     {
-        let (changed, size) = self.accelerated().sweep(like, model, leg, at);
+        let (changed, size) = self.accelerated().sweep(like, model, input, at);
         let (changed, size) = Magnitude::of_both(changed, size);
-        let h = leg.h.abs();
+        let h = input.h.abs();
         let speed = larger(self.speed, h * size);
         let distance = larger(self.distance, h * (self.speed + h * size));
         let velocity = h * changed / speed;
@@ -239,19 +242,19 @@ impl<const N: usize, S: Storage> Work<N, S> {
         &mut self,
         like: V,
         model: &M,
-        leg: &Leg<'_, N, S>,
+        input: &StepInput<'_, N, S>,
         at: &mut Evaluation<V, N>,
         refresh: bool,
     ) -> Increment
     where
         M: Model<N>,
     {
-        let (changed, size) = (self.rows()).sweep_velocity(like, model, leg, at, refresh);
+        let (changed, size) = (self.rows()).sweep_velocity(like, model, input, at, refresh);
         let (changed, size) = Magnitude::of_both(changed, size);
-        let position = beside(leg.h, self.distance, size, changed);
+        let position = beside(input.h, self.distance, size, changed);
         // The momentum at the end is as accurate as the velocities, whatever the step. The rest of an increment affects
         // it through the forces only, hence the factor.
-        let velocity = 0.25 * beside(1.0, LEAST, size, changed);
+        let velocity = 0.25 * beside(1.0, MIN_SIZE, size, changed);
         let relative = if velocity > position {
             velocity
         } else {
@@ -266,18 +269,18 @@ impl<const N: usize, S: Storage> Work<N, S> {
         &mut self,
         like: V,
         model: &M,
-        leg: &Leg<'_, N, S>,
+        input: &StepInput<'_, N, S>,
         at: &mut Evaluation<V, N>,
         which: (bool, bool),
     ) -> Increment
     where
         M: Model<N>,
     {
-        let [of_rates, of_forces] = self.rows().sweep_phase(like, model, leg, at, which);
+        let [of_rates, of_forces] = self.rows().sweep_phase(like, model, input, at, which);
         let (changed, size) = Magnitude::of_both(of_rates.0, of_rates.1);
-        let position = beside(leg.h, self.distance, size, changed);
+        let position = beside(input.h, self.distance, size, changed);
         let (changed, size) = Magnitude::of_both(of_forces.0, of_forces.1);
-        let momentum = beside(leg.h, self.speed, size, changed);
+        let momentum = beside(input.h, self.speed, size, changed);
         let relative = if (position + momentum).is_nan() {
             f64::NAN
         } else {

@@ -1,7 +1,7 @@
 //! The weights of increments in an iteration that has converged relative to the largest coordinate.
 
 use super::forms::{is_phase, is_second_order};
-use super::{Leg, Work};
+use super::{StepInput, Work};
 use crate::legendre::larger;
 use crate::model::Model;
 use crate::precise::Precise;
@@ -48,7 +48,7 @@ impl<V: Precise> Sizing<V> {
     }
 }
 
-impl<const N: usize, S: Storage> Leg<'_, N, S> {
+impl<const N: usize, S: Storage> StepInput<'_, N, S> {
     /// Compares increments of small coordinates with these from now on; false where none is small beside the largest
     /// one.
     // Here and in what it calls there are no closures: they would be compiled for the instruction set of the crate. The

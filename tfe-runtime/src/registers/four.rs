@@ -9,7 +9,7 @@ use crate::precise::Precise;
 use crate::real::{Real, fused};
 
 /// Work in a function of its own, which is compiled for the instruction set of the numbers with which it computes.
-pub(crate) trait Apart {
+pub(crate) trait OutOfLine {
     fn run<V: Four>(self, like: V);
 }
 
@@ -20,7 +20,7 @@ pub(crate) trait Four: Side<4> {
         not(feature = "alloc"),
         allow(dead_code, reason = "bundles of trajectories and registers need it")
     )]
-    fn apart<W: Apart>(self, work: W);
+    fn out_of_line<W: OutOfLine>(self, work: W);
 
     /// sin and cos of `self`, and of `other`.
     #[cfg(feature = "alloc")]
@@ -168,7 +168,7 @@ impl Four for Lanes<4> {
     }
 
     #[inline(never)]
-    fn apart<W: Apart>(self, work: W) {
+    fn out_of_line<W: OutOfLine>(self, work: W) {
         work.run(self);
     }
 

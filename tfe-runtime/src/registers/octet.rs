@@ -1,6 +1,6 @@
 //! Eight numbers in one register of a processor with AVX-512, for eight trajectories side by side. The rules are those of [`quad`](crate::registers::quad).
 
-use crate::registers::pair::{Apart, Eight, LANES};
+use crate::registers::pair::{Eight, LANES, OutOfLine};
 use crate::registers::side::Side;
 use crate::trigonometry::LIMIT;
 use pulp::x86::V4;
@@ -33,7 +33,7 @@ impl Octet {
 
     /// Runs work in a function of its own.
     #[inline(always)]
-    pub(crate) fn apart<W: Apart>(self, work: W) {
+    pub(crate) fn out_of_line<W: OutOfLine>(self, work: W) {
         self.isa.vectorize(Call {
             isa: self.isa,
             work,
@@ -46,7 +46,7 @@ struct Call<W> {
     work: W,
 }
 
-impl<W: Apart> pulp::NullaryFnOnce for Call<W> {
+impl<W: OutOfLine> pulp::NullaryFnOnce for Call<W> {
     type Output = ();
     #[inline(always)]
     fn call(self) {
@@ -73,7 +73,7 @@ impl Eight for Octet {
     }
 
     #[inline(always)]
-    fn apart<W: Apart>(self, work: W) {
-        self.apart(work);
+    fn out_of_line<W: OutOfLine>(self, work: W) {
+        self.out_of_line(work);
     }
 }

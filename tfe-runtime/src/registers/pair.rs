@@ -23,18 +23,18 @@ pub trait Eight: Side<LANES> {
     }
 
     /// Runs the work with numbers of this kind.
-    fn apart<W: Apart>(self, work: W);
+    fn out_of_line<W: OutOfLine>(self, work: W);
 }
 
 /// Work in a function of its own, which is compiled for the instruction set of the numbers with which it computes.
-pub trait Apart {
+pub trait OutOfLine {
     fn run<V: Eight>(self, like: V);
 }
 
 /// The same with pairs.
 struct Paired<W>(W);
 
-impl<W: Apart> four::Apart for Paired<W> {
+impl<W: OutOfLine> four::OutOfLine for Paired<W> {
     #[inline(always)]
     fn run<V: Four>(self, like: V) {
         self.0.run(Pair(like, like));
@@ -67,8 +67,8 @@ impl<V: Four> Eight for Pair<V> {
     }
 
     #[inline(always)]
-    fn apart<W: Apart>(self, work: W) {
-        self.0.apart(Paired(work));
+    fn out_of_line<W: OutOfLine>(self, work: W) {
+        self.0.out_of_line(Paired(work));
     }
 }
 

@@ -9,7 +9,7 @@
 //! goes through [`pulp`].
 
 use crate::real::Real;
-use crate::registers::four::Apart;
+use crate::registers::four::OutOfLine;
 use crate::registers::pair::Pair;
 use crate::trigonometry::{LIMIT, Turn, cos_of_small, reduced, sin_of_small};
 use pulp::x86::V3;
@@ -85,7 +85,7 @@ impl Quad {
 
     /// Runs work in a function of its own.
     #[inline(always)]
-    pub(crate) fn apart<W: Apart>(self, work: W) {
+    pub(crate) fn out_of_line<W: OutOfLine>(self, work: W) {
         self.isa.vectorize(Call {
             isa: self.isa,
             work,
@@ -138,7 +138,7 @@ struct Call<W> {
     work: W,
 }
 
-impl<W: Apart> pulp::NullaryFnOnce for Call<W> {
+impl<W: OutOfLine> pulp::NullaryFnOnce for Call<W> {
     type Output = ();
     #[inline(always)]
     fn call(self) {

@@ -1,6 +1,6 @@
 //! Four points in one register of the processor.
 
-use super::four::{Apart, Four, each_point};
+use super::four::{Four, OutOfLine, each_point};
 use super::side::Side;
 use super::storage::{Matrix, Row, Storage};
 use crate::lanes::Lanes;
@@ -38,8 +38,8 @@ impl Four for Quad {
     }
 
     #[inline(always)]
-    fn apart<W: Apart>(self, work: W) {
-        self.apart(work);
+    fn out_of_line<W: OutOfLine>(self, work: W) {
+        self.out_of_line(work);
     }
 
     #[inline(always)]

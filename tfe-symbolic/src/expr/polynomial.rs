@@ -8,7 +8,7 @@ use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::ordered::SortedMap;
 
 /// Expressions with more terms than this are not compared.
-const MOST_TERMS: usize = 512;
+const MAX_TERMS: usize = 512;
 
 /// Σ c x: coefficients by products of atoms; the number one stands for the constant.
 type Polynomial = SortedMap<ExprId, Constant>;
@@ -18,7 +18,7 @@ impl Graph {
     ///
     /// Functions and their arguments, quotients by sums and sums over ranges are atoms.
     pub(crate) fn expanded(&mut self, root: ExprId) -> Option<ExprId> {
-        self.expanded_within(root, MOST_TERMS)
+        self.expanded_within(root, MAX_TERMS)
     }
 
     /// The same, with the largest number of terms on the way.

@@ -357,7 +357,7 @@ impl Lowerer<'_> {
         let of_run_time = affines.iter().any(|affine| affine.is_of_run_time());
         let mut looked_at = assignments(names.len(), large.min(MAX_LENGTH) as i64);
         if of_run_time {
-            if names.len() > MOST_COMBINED {
+            if names.len() > MAX_COMBINED {
                 return None;
             }
             let least = match self.is_of_run_time_length() {
@@ -438,7 +438,7 @@ const SMALL_LENGTHS: (i64, i64) = (2, 12);
 const SMALL_VALUES: [i64; 9] = [0, 1, 2, 3, 4, 5, 6, 8, 12];
 
 /// The number of fields of which that is possible.
-const MOST_COMBINED: usize = 3;
+const MAX_COMBINED: usize = 3;
 
 /// The generic lengths that stand in indices, each once.
 fn generic_lengths<'a>(affines: &[&'a Affine]) -> Vec<&'a str> {

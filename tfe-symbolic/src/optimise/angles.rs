@@ -40,7 +40,7 @@ use choice::{Angle, Choice, How, Need, canonical, choose};
 const LARGEST: u64 = 8;
 
 /// The largest number of nodes examined in an argument.
-const MOST_STEPS: usize = 24;
+const MAX_STEPS: usize = 24;
 
 /// The roots with sines and cosines of sums expanded where that pays.
 pub(crate) fn expand_angles(graph: &mut Graph, roots: Vec<ExprId>) -> Vec<ExprId> {
@@ -139,7 +139,7 @@ fn read(graph: &mut Graph, argument: ExprId) -> Option<(Angle, bool)> {
     let mut steps = 0;
     while let Some((factor, x)) = waiting.pop() {
         steps += 1;
-        if steps > MOST_STEPS {
+        if steps > MAX_STEPS {
             return None;
         }
         match graph.node(x) {

@@ -15,10 +15,10 @@ use crate::schedule::loop_nest::{Block, Sink, Target};
 use apart::all_apart;
 
 /// The largest number of writes that are run through.
-const MOST_WRITES: usize = 100_000;
+const MAX_WRITES: usize = 100_000;
 
 /// An array with more places to be set to zero is cleared as a whole.
-const MOST_ZEROS: usize = 32;
+const MAX_ZEROS: usize = 32;
 
 /// Decides for each result, and inserts zeros in front where they are needed; returns the arrays that have to be
 /// cleared.
@@ -59,7 +59,7 @@ pub(crate) fn settle(root: &mut Block, zero: ExprId) -> SortedSet<Array> {
     });
     let mut front = Vec::new();
     for (array, places) in zeros {
-        if places.len() > MOST_ZEROS {
+        if places.len() > MAX_ZEROS {
             cleared.insert(array);
         } else {
             let stores = places.into_iter();
@@ -152,13 +152,13 @@ impl Turns {
                 Step::Write(number) => self.write(*number, values),
                 Step::Loop(range, inner) => {
                     let bounds = value(&range.start, values).zip(value(&range.end, values));
-                    let Some((start, end)) = bounds.filter(|_| self.writes < MOST_WRITES) else {
+                    let Some((start, end)) = bounds.filter(|_| self.writes < MAX_WRITES) else {
                         self.unknown_in(inner);
                         continue;
                     };
                     for turn in start..end {
                         self.writes += 1;
-                        if self.writes > MOST_WRITES {
+                        if self.writes > MAX_WRITES {
                             self.unknown_in(inner);
                             break;
                         }

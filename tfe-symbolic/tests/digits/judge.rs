@@ -31,7 +31,7 @@ use super::entries::{Entry, entries};
 use super::formula::{Schedule, State};
 use super::kernels::{Kernel, kernels, run};
 use super::random::Random;
-use super::reference::{MOST, Reference, UNDERFLOW, Value, distance};
+use super::reference::{MAX, Reference, UNDERFLOW, Value, distance};
 use super::states::{Regime, beside, regimes};
 use super::writer::Model;
 
@@ -186,7 +186,7 @@ impl Case<'_> {
                     .filter(|value| value.state < self.results.len());
                 let with_angles = judged
                     .map(|value| value.allowance() + reference.by_angles(value, entry))
-                    .filter(|allowed| *allowed <= MOST)
+                    .filter(|allowed| *allowed <= MAX)
                     .chain([allowed]);
                 let loss = Loss {
                     loss: worst.error / largest(with_angles),

@@ -8,7 +8,7 @@ use super::formula::{Schedule, State, ulp};
 pub const UNDERFLOW: f64 = 1e-250;
 
 /// A state is left out where the formula may lose more than this: nothing could exceed a multiple of it.
-pub const MOST: f64 = f64::MAX / 1024.0;
+pub const MAX: f64 = f64::MAX / 1024.0;
 
 /// A state is left out where a switch is nearer to its kink than so many times the rounding of the formula.
 const KINK: f64 = 16.0;
@@ -100,7 +100,7 @@ impl<'a> Reference<'a> {
                 exact,
                 rounding,
             };
-            let is_known = value.allowance() <= MOST;
+            let is_known = value.allowance() <= MAX;
             (finite && is_known && self.usable[state]).then_some(value)
         };
         self.values.iter().enumerate().filter_map(value).collect()

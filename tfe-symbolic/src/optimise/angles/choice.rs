@@ -53,10 +53,10 @@ struct Step {
 }
 
 /// The number of helpers that are tried one by one.
-const MOST_TRIALS: usize = 24;
+const MAX_TRIALS: usize = 24;
 
 /// The number of known angles that are tried as part of another one.
-const MOST_PARTS: usize = 64;
+const MAX_PARTS: usize = 64;
 
 const BOTH: Need = Need {
     sine: true,
@@ -99,12 +99,7 @@ pub(super) fn choose(
     if trial.cost() < best.cost() {
         (best, helpers) = (trial, all);
     }
-    for atom in helpers
-        .keys()
-        .take(MOST_TRIALS)
-        .cloned()
-        .collect::<Vec<_>>()
-    {
+    for atom in helpers.keys().take(MAX_TRIALS).cloned().collect::<Vec<_>>() {
         let mut other = helpers.clone();
         if let Some(used) = other.get_mut(&atom) {
             *used = !*used;
@@ -258,7 +253,7 @@ impl Choice {
             .iter()
             .map(|(x, _)| self.with_atom.get(x).map_or(empty, |found| found))
             .min_by_key(|found| found.len())?;
-        for at in candidates.iter().take(MOST_PARTS) {
+        for at in candidates.iter().take(MAX_PARTS) {
             let part = &self.steps[*at].angle;
             let fits = |other: &Angle| {
                 size(part) + size(other) == size(angle) && self.known.contains_key(other)

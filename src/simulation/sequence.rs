@@ -5,21 +5,21 @@ use crate::error::RunErrorKind;
 
 /// A stepper with the elements to come.
 #[derive(Debug)]
-pub(super) struct Course<S> {
+pub(super) struct ElementSequence<S> {
     /// `None` once the sequence has ended.
     stepper: Option<S>,
-    legs: Legs,
+    upcoming: Upcoming,
 }
 
 /// The elements to come, or the error at which the sequence ended, until that has been returned.
 #[derive(Debug)]
-struct Legs {
+struct Upcoming {
     elements: Result<Endless, Option<RunErrorKind>>,
     element: usize,
 }
 
 /// One element of the sequence.
-pub(super) struct Leg {
+pub(super) struct SequenceElement {
     pub(super) number: usize,
     /// The start from which the times of points are counted.
     pub(super) begin: f64,
@@ -29,11 +29,11 @@ pub(super) struct Leg {
     pub(super) nodes: (f64, f64),
 }
 
-impl Legs {
-    fn next(&self) -> Option<Leg> {
+impl Upcoming {
+    fn next(&self) -> Option<SequenceElement> {
         let elements = self.elements.as_ref().ok()?;
         let (time, next, h, begin) = elements.element();
-        Some(Leg {
+        Some(SequenceElement {
             number: self.element,
             begin,
             h,
@@ -49,20 +49,20 @@ impl Legs {
     }
 }
 
-impl<S> Course<S> {
+impl<S> ElementSequence<S> {
     pub(super) fn new(way: Result<(S, Endless), RunErrorKind>) -> Self {
         let (stepper, elements) = match way {
             Ok((stepper, elements)) => (Some(stepper), Ok(elements)),
             Err(kind) => (None, Err(Some(kind))),
         };
-        let legs = Legs {
+        let upcoming = Upcoming {
             elements,
             element: 0,
         };
-        Self { stepper, legs }
+        Self { stepper, upcoming }
     }
 
-    /// The stepper, unless the course has ended.
+    /// The stepper, unless the sequence has ended.
     pub(super) fn stepper(&self) -> Option<&S> {
         self.stepper.as_ref()
     }
@@ -74,13 +74,13 @@ impl<S> Course<S> {
 
     /// The start of the next element, unless the sequence has ended.
     pub(super) fn time(&self) -> Option<f64> {
-        Some(self.legs.next()?.nodes.0)
+        Some(self.upcoming.next()?.nodes.0)
     }
 
     /// The stepper and the next element, unless the sequence has ended.
-    pub(super) fn begin(&mut self) -> Option<(&mut S, Leg)> {
-        match (&mut self.stepper, self.legs.next()) {
-            (Some(stepper), Some(leg)) => Some((stepper, leg)),
+    pub(super) fn begin(&mut self) -> Option<(&mut S, SequenceElement)> {
+        match (&mut self.stepper, self.upcoming.next()) {
+            (Some(stepper), Some(element)) => Some((stepper, element)),
             _ => None,
         }
     }
@@ -88,16 +88,16 @@ impl<S> Course<S> {
     /// Goes on to the element after this one, or ends the sequence.
     pub(super) fn end(&mut self, goes_on: bool) {
         match goes_on {
-            true => self.legs.advance(),
+            true => self.upcoming.advance(),
             false => {
                 self.stepper = None;
-                self.legs.elements = Err(None);
+                self.upcoming.elements = Err(None);
             }
         }
     }
 
     /// Takes the error at which the sequence ended.
     pub(super) fn failure(&mut self) -> Option<RunErrorKind> {
-        self.legs.elements.as_mut().err()?.take()
+        self.upcoming.elements.as_mut().err()?.take()
     }
 }
