@@ -5,6 +5,7 @@
 //! decreases.
 
 use super::chain::Chain;
+#[cfg(feature = "sparse")]
 use super::convergence::Size;
 use super::error::AssemblyError;
 use super::newton::{Assembly, Iterate, Problem};
