@@ -210,11 +210,6 @@ pub enum RunErrorKind {
         /// The time of the last node.
         time: f64,
     },
-    /// The call cannot be used with steps that are cut at [kinks](crate::Simulation::at_kinks).
-    KinksUnsupported {
-        /// The call.
-        call: &'static str,
-    },
     /// The equations of an element could not be solved.
     Solve {
         /// The number of the element, from 0.
@@ -324,9 +319,8 @@ impl<const N: usize, L: Length<N>> RunError<N, L> {
 
     /// The same error for a call that was made by another one; that one is named.
     pub(crate) fn of_call(mut self, made: &str, by: &'static str) -> Self {
-        if let RunErrorKind::SetUnsupported { call }
-        | RunErrorKind::KinksUnsupported { call }
-        | RunErrorKind::Unsupported { call, .. } = &mut self.kind
+        if let RunErrorKind::SetUnsupported { call } | RunErrorKind::Unsupported { call, .. } =
+            &mut self.kind
             && *call == made
         {
             *call = by;
@@ -472,10 +466,6 @@ impl fmt::Display for RunErrorKind {
                 let time = Short(*time);
                 write!(f, "a step after t = {time} failed: the run has ended; begin another one from the last node")
             }
-            Self::KinksUnsupported { call } => write!(
-                f,
-                "`{call}` does not support steps that are cut at kinks, because derivatives do not include the change of the times of the cuts; `run` does"
-            ),
             Self::NodeOrder { node, time } => {
                 let time = Short(*time);
                 write!(

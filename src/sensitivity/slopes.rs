@@ -1,19 +1,9 @@
-//! Derivatives of velocities and outputs by states, times and parameters, for models of fixed size.
+//! Changes of points of motions, and parameters as directions.
 
 use crate::length::{FixedLength, Length};
 use nalgebra::{DMatrix, DVector};
-use tfe_runtime::constrained::HeldVelocity;
 use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::{CoordinateName, Direction, First, Form, Model, Parameter};
-
-/// A point of a motion with its velocity.
-#[derive(Clone, Copy)]
-pub(crate) struct Place<'a, const N: usize> {
-    pub(crate) t: f64,
-    pub(crate) q: &'a [f64; N],
-    pub(crate) p: &'a [f64; N],
-    pub(crate) v: &'a [f64; N],
-}
 
 /// A change of a point of a motion, for models of either kind of length.
 #[derive(Clone)]
@@ -49,81 +39,8 @@ impl<const N: usize, L: Length<N>> Change<N, L> {
     }
 }
 
-/// The derivatives of the velocities and outputs of a model at a point.
-pub(crate) struct Along<'a, M, const N: usize> {
-    model: &'a M,
-    place: Place<'a, N>,
-    /// The inverse of L_vv of a Lagrangian.
-    inverse: Option<DMatrix<f64>>,
-    /// Used if L_vv is singular, and the constraints determine the velocity.
-    held: Option<HeldVelocity<N>>,
-}
-
-impl<'a, M: Model<N>, const N: usize> Along<'a, M, N> {
-    pub(crate) fn new(model: &'a M, place: Place<'a, N>) -> Self {
-        let Place { t, q, p, v } = place;
-        let held = HeldVelocity::of(model, t, (q, p), v);
-        let inverse = match (M::FORM, &held) {
-            (Form::Hamiltonian, _) => None,
-            // The constraints do not determine the velocity either.
-            (Form::Lagrangian, Err(_)) => Some(unknown(N)),
-            (Form::Lagrangian, Ok(_)) => {
-                let (mut first, mut zz) = (First::ZERO, [[0.0; N]; N]);
-                model.first_and_mass(t, q, v, &mut first, &mut zz);
-                Some(inverse_of(&zz))
-            }
-        };
-        Self {
-            model,
-            place,
-            inverse,
-            held: held.unwrap_or_default(),
-        }
-    }
-
-    /// δv; NaN if the mass matrix is singular. With constraints, for changes that these allow.
-    pub(crate) fn velocity(&self, change: &Change<N>) -> [f64; N] {
-        let Place { t, q, p, v } = self.place;
-        let time = Dual::new(t, change.t).by_parameter(change.parameter);
-        let q = duals(q, &change.q);
-        let mut first = First::zero();
-        let Some(inverse) = &self.inverse else {
-            let p = duals(p, &change.p);
-            self.model.first(time, &q, &p, &mut first);
-            return slopes(&first.z);
-        };
-        // p = L_v(q, v, t): L_vv δv = δp − ∂L_v/∂(t, q, a).
-        self.model.first(time, &q, &still(v), &mut first);
-        let right = difference(&change.p, &slopes(&first.z));
-        match &self.held {
-            Some(held) => held.slope(self.model, (time, &q), v, &right),
-            None => product(inverse, &right),
-        }
-    }
-}
-
-fn unknown(size: usize) -> DMatrix<f64> {
-    DMatrix::from_element(size, size, f64::NAN)
-}
-
 fn square<const N: usize>(entries: &[[f64; N]; N]) -> DMatrix<f64> {
     DMatrix::from_fn(N, N, |a, b| entries[a][b])
-}
-
-/// The inverse of a mass matrix; NaN if it is singular. By factorisation: for two to four coordinates, nalgebra would
-/// divide by the determinant, a product of as many masses, which may overflow or underflow.
-fn inverse_of<const N: usize>(mass: &[[f64; N]; N]) -> DMatrix<f64> {
-    let inverse = square(mass).lu().try_inverse();
-    inverse.unwrap_or_else(|| unknown(N))
-}
-
-fn product<const N: usize>(matrix: &DMatrix<f64>, vector: &[f64; N]) -> [f64; N] {
-    let found = matrix * DVector::from_column_slice(vector);
-    std::array::from_fn(|a| found[a])
-}
-
-fn difference<const N: usize>(a: &[f64; N], b: &[f64; N]) -> [f64; N] {
-    std::array::from_fn(|k| a[k] - b[k])
 }
 
 /// Numbers that do not change.

@@ -1,9 +1,11 @@
 //! Models of either kind of length, as seen by derivatives along runs.
 
-use super::slopes::{Along, Change, Place};
+use super::slopes::Change;
 use crate::evaluate::Evaluate;
 use crate::length::{FixedLength, Length};
 use crate::motion::Node;
+use tfe_runtime::constrained::VelocitySlope;
+use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::{First, Form, Model};
 #[cfg(feature = "sparse")]
 use {
@@ -36,8 +38,11 @@ fn sign(form: Form) -> f64 {
 impl<M: Model<N>, const N: usize> Varied<N, FixedLength> for M {
     fn velocity_along<'a>(&'a self, node: &'a Node<N>) -> Velocity<'a, N, FixedLength> {
         let Node { t, q, p, v } = node;
-        let along = Along::new(self, Place { t: *t, q, p, v });
-        Box::new(move |change| along.velocity(change))
+        let slope = VelocitySlope::new(self, *t, (q, p), v);
+        Box::new(move |change| {
+            let time = Dual::new(*t, change.t).by_parameter(change.parameter);
+            slope.along(time, (&duals(q, &change.q), &duals(p, &change.p)))
+        })
     }
 
     fn push(&self, node: &Node<N>) -> [f64; N] {

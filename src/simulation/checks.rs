@@ -106,15 +106,3 @@ fn check_residuals(time: f64, residuals: Vec<Residual>) -> Result<(), RunErrorKi
         Err(RunErrorKind::Inconsistent { time, residuals })
     }
 }
-
-/// Refuses derivatives of runs that cut steps at kinks: the derivatives neglect that the times of the cuts move, which
-/// matters where the force jumps.
-pub(super) fn check_kinks<M: Model<N>, const N: usize>(
-    at_kinks: Option<bool>,
-    call: &'static str,
-) -> Result<(), RunErrorKind> {
-    if at_kinks == Some(true) && const { !M::FACTS.smooth } {
-        return Err(RunErrorKind::KinksUnsupported { call });
-    }
-    Ok(())
-}

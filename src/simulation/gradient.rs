@@ -5,7 +5,7 @@ mod backward;
 mod family;
 mod view;
 
-use super::checks::check_kinks;
+use super::kind::Simulated;
 use super::mesh::Mesh;
 use super::setup::Simulation;
 use super::trail::is_same;
@@ -68,9 +68,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::NoOutput`] or [`RunErrorKind::Loss`] if the loss does
     /// not fit the model or the span, [`RunErrorKind::Transition`] if an element or an event has no derivative,
-    /// [`RunErrorKind::SetUnsupported`] if an event [sets](crate::Act::Set) a parameter, and
-    /// [`RunErrorKind::KinksUnsupported`] after [`at_kinks(true)`](Self::at_kinks), because the times of the cuts
-    /// depend on the parameters.
+    /// and [`RunErrorKind::SetUnsupported`] if an event [sets](crate::Act::Set) a parameter.
     pub fn gradient(
         &self,
         start: State<N>,
@@ -79,9 +77,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ) -> Result<(f64, LossGradient<N>), RunError<N>> {
         let outputs = (0..self.model.columns()).map(|at| self.model.column_name(at));
         let outputs: Vec<_> = outputs.collect();
-        let checked = check_kinks::<M, N>(self.at_kinks, "gradient");
-        let checked = checked.and_then(|()| loss.check(&outputs, (span.start, span.end)));
-        if let Err(kind) = checked {
+        if let Err(kind) = loss.check(&outputs, (span.start, span.end)) {
             let motion = Motion::from_start(&*self.model, span.start, &start);
             return Err(RunError::new(kind, motion));
         }
@@ -224,13 +220,12 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
         run: &'a Simulation<'m, M, N>,
         (mesh, elements): (&'a Mesh<N>, &'a [(f64, f64, f64)]),
     ) -> Result<Self, RunErrorKind> {
-        let stepper = Stepper::sharing(run.model.clone(), run.chosen_element(), run.control);
         let parameters = run.all_parameters();
         Ok(Self {
             model: &*run.model,
             mesh,
             elements,
-            stepper: stepper.map_err(RunErrorKind::of_stepper)?,
+            stepper: M::stepper(run.model.clone(), run.chosen())?,
             by_parameters: vec![0.0; parameters.len()],
             parameters,
             pull: Pull::new(&*run.model),
@@ -295,7 +290,12 @@ impl<'a, 'm, M: Model<N>, const N: usize> Descent<'a, 'm, M, N> {
             let (element, before) = (first + number, motion.states()[number].state());
             let mut state = before;
             self.solve(element, &mut state)?;
-            let inside = view.of_element(&mut self.pull, inner)?;
+            let mut inside = view.of_element(&mut self.pull, inner)?;
+            if inside.len() > 1 {
+                for (loss, piece) in inside.iter_mut().zip(inner.pieces()) {
+                    loss.ends = view.by_ends(piece)?;
+                }
+            }
             let (time, next, step) = self.elements[element];
             let pieces = self.stepper.dense(time, next).pieces().len();
             let is_cut_alike = inside.is_empty() || inside.len() == pieces;

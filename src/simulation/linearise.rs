@@ -2,7 +2,6 @@
 
 mod family;
 
-use super::checks::check_kinks;
 use super::events::Severed;
 use super::follow::{Follow, Passed};
 use super::sensitive::Tangents;
@@ -10,7 +9,6 @@ use super::setup::Simulation;
 use crate::constraints::allowed;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
-use crate::motion::Motion;
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
@@ -36,21 +34,15 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Transition`] if an element has no transition matrix,
-    /// [`RunErrorKind::KinksUnsupported`] after [`at_kinks(true)`](Self::at_kinks), because the times of the cuts
-    /// depend on the state, [`RunErrorKind::SetByState`] if an event [sets](crate::Act::Set) a parameter to a value
+    /// [`RunErrorKind::SetByState`] if an event [sets](crate::Act::Set) a parameter to a value
     /// that depends on the state.
     pub fn run_linearised(
         &self,
         start: State<N>,
         span: Range<f64>,
     ) -> Result<Linearised<N>, RunError<N>> {
-        if let Err(kind) = check_kinks::<M, N>(self.at_kinks, "run_linearised") {
-            let motion = Motion::from_start(&*self.model, span.start, &start);
-            return Err(RunError::new(kind, motion));
-        }
-        let chosen = (self.chosen_element(), self.control);
         let mut matrices = Matrices {
-            tangents: Tangents::new(self.model.clone(), chosen, &[]),
+            tangents: Tangents::new(self.model.clone(), self.chosen(), &[]),
             is_across: false,
             entries: vec![0.0; 4 * N * N],
             transitions: Vec::new(),

@@ -1,6 +1,5 @@
 //! Poincaré sections: the points where a motion crosses a surface.
 
-use super::checks::check_kinks;
 use super::events::Severed;
 use super::events::act::{Act, Crossing, Event, On};
 use super::follow::{Follow, Passed};
@@ -255,20 +254,10 @@ impl<M: Model<N>, const N: usize> Section<'_, M, N> {
     /// Computes the [transition matrix](SectionPoint::transition) of each point from now on, for the cost of a
     /// factorisation and 2N solutions in each step, and as much again at each point.
     ///
-    /// If steps are to be cut at [kinks](Simulation::at_kinks), the next point is the error
-    /// [`RunErrorKind::KinksUnsupported`], because the times of the cuts depend on the state. If an event sets a
-    /// parameter to a value that depends on the state, the iterator ends with [`RunErrorKind::SetByState`].
+    /// If an event sets a parameter to a value that depends on the state, the iterator ends with [`RunErrorKind::SetByState`].
     #[must_use]
     pub fn linearised(mut self) -> Self {
-        let Chosen {
-            element,
-            control,
-            at_kinks,
-        } = self.chosen;
-        if let Err(kind) = check_kinks::<M, N>(Some(at_kinks), "linearised") {
-            self.endless.sequence = ElementSequence::new(Err(kind));
-        }
-        let tangents = Tangents::new(self.model.clone(), (element, control), &[]);
+        let tangents = Tangents::new(self.model.clone(), self.chosen, &[]);
         self.crossings.tangents = Some(tangents);
         self
     }

@@ -7,9 +7,9 @@ pub(super) mod jump;
 #[cfg(feature = "sparse")]
 pub(super) mod transposed;
 
-use super::checks::check_kinks;
 use super::events::Severed;
 use super::follow::{Follow, Passed};
+use super::kind::Chosen;
 use super::setup::Simulation;
 use crate::constraints::tangent_basis;
 use crate::error::{RunError, RunErrorKind};
@@ -22,11 +22,9 @@ use jump::Jump;
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
-use tfe_runtime::step::{Control, Stepper};
+use tfe_runtime::step::Stepper;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{
-    ConstraintError, Direction, Element, InsideSlopes, Model, Share, State, StepError,
-};
+use tfe_runtime::{ConstraintError, Direction, InsideSlopes, Model, Share, State, StepError};
 
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Runs over the span as [`run`](Self::run) does, and keeps the derivatives of every recorded node with respect to
@@ -42,9 +40,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ///
     /// # Errors
     /// [`RunError`], as from [`run`](Self::run). [`RunErrorKind::Transition`] if an element or an event has no
-    /// derivative, [`RunErrorKind::SetUnsupported`] if an event [sets](crate::Act::Set) a parameter,
-    /// [`RunErrorKind::KinksUnsupported`] after [`at_kinks(true)`](Self::at_kinks), because the times of the cuts depend
-    /// on the state and the parameters.
+    /// derivative, [`RunErrorKind::SetUnsupported`] if an event [sets](crate::Act::Set) a parameter.
     pub fn run_sensitive(
         &self,
         start: State<N>,
@@ -80,8 +76,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     }
 
     fn tangents(&self, parameters: &[usize]) -> Tangents<'m, M, N> {
-        let chosen = (self.chosen_element(), self.control);
-        Tangents::new(self.model.clone(), chosen, parameters)
+        Tangents::new(self.model.clone(), self.chosen(), parameters)
     }
 
     fn differentiated(
@@ -90,10 +85,6 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
         mut tangents: Tangents<'m, M, N>,
     ) -> Result<Sensitive<N>, RunError<N>> {
-        if let Err(kind) = check_kinks::<M, N>(self.at_kinks, "run_sensitive") {
-            let motion = Motion::from_start(&*self.model, span.start, &start);
-            return Err(RunError::new(kind, motion));
-        }
         let motion = self.drive(start, &span, identity, Some(&mut tangents))?;
         Ok(tangents.into_sensitive(motion))
     }
@@ -102,7 +93,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
 /// Derivatives on their way along a run.
 pub struct Tangents<'m, M, const N: usize> {
     model: Share<'m, M>,
-    chosen: (Element, Control),
+    chosen: Chosen,
     /// The parameters, as directions.
     parameters: Vec<Direction>,
     carried: Carried,
@@ -146,7 +137,7 @@ impl Across {
 }
 
 impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
-    pub(super) fn new(model: Share<'m, M>, chosen: (Element, Control), indices: &[usize]) -> Self {
+    pub(super) fn new(model: Share<'m, M>, chosen: Chosen, indices: &[usize]) -> Self {
         Self {
             parameters: directions(&*model, indices),
             carried: Carried::new(N, indices),
@@ -280,10 +271,18 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
         severed: &Severed<'_, '_, N>,
     ) -> Result<(Reached, Option<Vec<InsideSlopes>>), TransitionError> {
         if severed.inside {
-            let (element, control) = self.chosen;
             let mut probe = match self.probe.take() {
                 Some(probe) => probe,
-                None => Stepper::sharing(self.model.clone(), element, control)?,
+                None => {
+                    let Chosen {
+                        element, control, ..
+                    } = self.chosen;
+                    let probe = Stepper::sharing(self.model.clone(), element, control)?;
+                    match self.chosen.at_kinks {
+                        true => probe.at_kinks(),
+                        false => probe,
+                    }
+                }
             };
             let mut state = *severed.before;
             let length = severed.length;

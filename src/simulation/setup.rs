@@ -257,9 +257,9 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
     ///
     /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) cut steps at kinks only
     /// after `at_kinks(true)`; runs with an [`accuracy`](Self::accuracy) do so unless `at_kinks(false)` was called.
-    /// `run_linearised`, `run_sensitive`, `gradient`, `hessian` and linearised [sections](Self::section) fail with
-    /// [`RunErrorKind::KinksUnsupported`], because their derivatives do not include the change of the time at which a
-    /// step is cut; for models of run-time length, derivatives across a kink fail with [`RunErrorKind::Unsupported`].
+    /// `run_linearised`, `run_sensitive`, `gradient`, `hessian` and linearised [sections](Self::section) include the
+    /// change of the times at which steps are cut (T-167); for models of run-time length, derivatives across a kink fail
+    /// with [`RunErrorKind::Unsupported`].
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -1,5 +1,8 @@
 //! Forces with kinks and jumps: elements keep their order of accuracy, and an accuracy asked for is met or refused.
 
+mod derivatives;
+#[path = "../common/differences.rs"]
+mod differences;
 #[path = "../common/largest.rs"]
 mod largest;
 mod scene;
@@ -329,54 +332,6 @@ fn late_steps_beside_kinks_keep_their_length() {
             "{start}: {q} {v}"
         );
     }
-}
-
-/// Runs that cannot cut steps at kinks refuse the option.
-#[test]
-fn what_cannot_be_cut_at_kinks_is_refused() {
-    let start = BOUNCE.state([0.1], [0.0]);
-    let run = Simulation::new(&BOUNCE).step(0.02).at_kinks(true);
-    let refused = run.run_linearised(start, 0.0..1.0).expect_err("kinks");
-    let kind = refused.kind();
-    assert!(
-        matches!(kind, RunErrorKind::KinksUnsupported { .. }),
-        "{kind}"
-    );
-    // A smooth model has no kinks to cut at.
-    let smooth = Simulation::new(&SMOOTHED).step(0.02).at_kinks(true);
-    let start = SMOOTHED.state([1.0], [0.0]);
-    smooth.run_linearised(start, 0.0..1.0).expect("a run");
-}
-
-/// The time of a cut depends on the initial state. If the force jumps there, a derivative that neglects this would be
-/// wrong: it is refused.
-#[test]
-fn derivatives_of_steps_cut_at_kinks_are_refused() {
-    #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - g*abs(x), output(place) = x)]
-    struct Valley {
-        g: f64,
-    }
-    let valley = Valley { g: 1.0 };
-    let start = valley.state([0.6], [0.0]);
-    let run = Simulation::new(&valley).step(0.1).at_kinks(true);
-    let check = |kind: &RunErrorKind, call: &'static str| {
-        assert_eq!(kind, &RunErrorKind::KinksUnsupported { call });
-    };
-    let error = run.run_sensitive(start, 0.0..2.0);
-    check(error.expect_err("kinks").kind(), "run_sensitive");
-    let loss = tfe::sensitivity::Loss::output_at_end("place");
-    let error = run.gradient(start, 0.0..2.0, &loss);
-    check(error.expect_err("kinks").kind(), "gradient");
-    let error = run.hessian(start, 0.0..2.0, &loss, ["g"]);
-    check(error.expect_err("kinks").kind(), "hessian");
-    let section = || run.section("place", Crossing::Either, start, 0.0);
-    let mut linearised = section().linearised();
-    let error = linearised.next().expect("an error");
-    check(&error.expect_err("kinks"), "linearised");
-    assert!(linearised.next().is_none());
-    // Without derivatives there is nothing to refuse.
-    let point = section().next().expect("a point").expect("a crossing");
-    assert!((point.t - 1.2_f64.sqrt()).abs() < 1e-12);
 }
 
 /// A structure at rest whose sites begin to move one after the other. Quantities that grow from zero as powers of a

@@ -11,7 +11,7 @@
 //! is singular at isolated steps, is never inverted.
 
 use crate::dual::{Dual, duals};
-use crate::error::StepError;
+use crate::error::{StepError, TransitionError};
 use crate::lu;
 use crate::model::{By, First, Model, Second};
 use crate::phase_form::PhaseForm;
@@ -29,6 +29,21 @@ pub struct Direction {
     pub parameter: Option<Parameter>,
     /// The factor of an additional force along the velocities, Q += damping · γ v.
     pub damping: f64,
+}
+
+/// Checks that there is a sum for each column.
+pub(crate) fn check_sums<const N: usize>(
+    directions: &[Direction],
+    lambda: &[f64],
+    by_direction: &[f64],
+) -> Result<(), TransitionError> {
+    if lambda.len() == 2 * N && by_direction.len() == directions.len() {
+        return Ok(());
+    }
+    Err(TransitionError::Shape {
+        needed: 2 * N + directions.len(),
+        given: lambda.len().min(2 * N) + by_direction.len(),
+    })
 }
 
 /// A parameter of a model by which derivatives are taken.

@@ -27,6 +27,8 @@ mod states;
 mod tangent;
 #[cfg(feature = "alloc")]
 pub(crate) mod trail;
+#[cfg(feature = "alloc")]
+mod velocity_slope;
 
 pub use crate::control::START_TOLERANCE;
 #[cfg(feature = "alloc")]
@@ -41,6 +43,8 @@ pub use states::{Residual, independent, residuals, units, velocity, velocity_for
 pub(crate) use trail::Foreseen;
 #[cfg(feature = "alloc")]
 pub use trail::Trail;
+#[cfg(feature = "alloc")]
+pub use velocity_slope::VelocitySlope;
 
 pub(crate) use derivative::linearise;
 #[cfg(feature = "alloc")]

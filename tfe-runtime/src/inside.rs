@@ -31,6 +31,26 @@ pub struct InsideSlopes {
     pub start: Vec<f64>,
     /// Derivatives of the Legendre coefficients of dq/dτ, N rows for each coefficient, then of those of dp/dτ.
     pub coefficients: Vec<f64>,
+    /// Derivatives of the times of its start and its end, if kinks move them; otherwise empty.
+    pub ends: [Vec<f64>; 2],
+}
+
+impl InsideSlopes {
+    /// Adds the derivatives of a loss of the polynomial: one number for each column.
+    pub fn add_to(&self, loss: &InsideLoss, sums: &mut [f64]) {
+        let matrices = [
+            (&loss.start, &self.start),
+            (&loss.coefficients, &self.coefficients),
+        ];
+        for (weights, rows) in matrices {
+            for (weight, row) in weights.iter().zip(rows.chunks_exact(sums.len().max(1))) {
+                add_multiple(sums, *weight, row);
+            }
+        }
+        for (weight, row) in loss.ends.iter().zip(&self.ends) {
+            add_multiple(sums, *weight, row);
+        }
+    }
 }
 
 /// The derivatives of a loss by the polynomial of an element, or of one piece of an element that was cut, with n
@@ -41,6 +61,8 @@ pub struct InsideLoss {
     pub start: Vec<f64>,
     /// By the Legendre coefficients of dq/dτ, a row of n for each, then by those of dp/dτ.
     pub coefficients: Vec<f64>,
+    /// By the times of the start and the end, at a fixed polynomial; used where kinks move them.
+    pub ends: [f64; 2],
 }
 
 impl InsideLoss {
@@ -50,6 +72,7 @@ impl InsideLoss {
         Self {
             start: vec![0.0; 2 * n],
             coefficients: vec![0.0; 2 * degree * n],
+            ends: [0.0; 2],
         }
     }
 

@@ -5,6 +5,7 @@
 //! changes its sign, the step is made of arcs that end at the roots.
 
 mod arc;
+mod root;
 mod search;
 mod watched;
 
@@ -14,6 +15,7 @@ use crate::error::StepError;
 use crate::model::{Form, Model};
 use alloc::vec::Vec;
 use arc::{Arc, arc};
+pub(crate) use root::{Change, Root};
 use watched::Origin;
 pub(crate) use watched::{Log, Watched};
 
@@ -59,8 +61,11 @@ pub(crate) trait Kinked:
     /// The number of points of an element, and whether some of them lie at its ends.
     fn points(&self) -> (usize, bool);
 
-    /// Counts a crossing of a kink.
-    fn crossed(&mut self);
+    /// Counts a crossing of a kink, at the end of the last piece: the root of a switching function, given by its index.
+    fn crossed(&mut self, switch: usize);
+
+    /// Called after a piece that leads over such a root.
+    fn stepped_over(&mut self) {}
 
     /// Whether steps that fail are cut, whether or not there are kinks.
     fn cuts(&self) -> bool;
@@ -160,7 +165,7 @@ pub(crate) fn in_arcs<S: Kinked + ?Sized>(
         (now, left, kicks) = (until, left - length, later);
         begins_at_root = matches!(arc, Arc::Crossing { .. });
         if let Arc::Crossing { switch, margin, .. } = arc {
-            stepper.crossed();
+            stepper.crossed(switch);
             crossings += 1;
             stepper.trust(true);
             if slides(stepper, (now, length), h, switch, state) {
@@ -174,6 +179,7 @@ pub(crate) fn in_arcs<S: Kinked + ?Sized>(
                 let crossed = stepper.whole(now, over, state, &[]);
                 crossed.map_err(|_| StepError::Slides)?;
                 stepper.passed(now, over, Vec::new());
+                stepper.stepped_over();
                 (now, left) = (now + over, left - over);
             }
         }

@@ -2,6 +2,7 @@
 
 mod advance;
 mod any;
+mod arcs;
 mod carried;
 mod common;
 mod dense;

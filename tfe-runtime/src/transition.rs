@@ -7,7 +7,7 @@ mod wanted;
 
 #[cfg(feature = "alloc")]
 use crate::backwards::Backwards;
-use crate::condense::{Direction, EndForces, Parameter, System};
+use crate::condense::{Direction, EndForces, Parameter, System, check_sums};
 use crate::constrained::element::ConstrainedForm;
 use crate::constrained::layout::Layout;
 use crate::constrained::rows::Rows;
@@ -101,21 +101,6 @@ where
         pivots: &mut pivots,
     };
     method.transition(&mut memory, workspace, &mut extra, &[], matrix)
-}
-
-/// Checks that there is a sum for each column.
-fn check_sums<const N: usize>(
-    directions: &[Direction],
-    lambda: &[f64],
-    by_direction: &[f64],
-) -> Result<(), TransitionError> {
-    if lambda.len() == 2 * N && by_direction.len() == directions.len() {
-        return Ok(());
-    }
-    Err(TransitionError::Shape {
-        needed: 2 * N + directions.len(),
-        given: lambda.len().min(2 * N) + by_direction.len(),
-    })
 }
 
 impl<M, T> Method<'_, M, T>

@@ -208,7 +208,14 @@ impl Carried {
         } = along;
         for piece in pieces {
             let times = piece.times;
-            let moved = (self.before.start.is_some() || ends.is_some()).then(|| {
+            let is_between_kinks = !piece.slopes.ends[0].is_empty();
+            let moved = if is_between_kinks {
+                let through = |row: &Vec<f64>| {
+                    let row = DMatrix::from_row_slice(1, row.len(), row);
+                    before.through(&row, ends).row(0).into_owned()
+                };
+                Some(piece.slopes.ends.each_ref().map(through))
+            } else if self.before.start.is_some() || ends.is_some() {
                 let still = vec![0.0; self.columns()];
                 let starts = self.before.start.as_ref().unwrap_or(&still);
                 let starts = RowDVector::from_row_slice(starts);
@@ -217,10 +224,13 @@ impl Carried {
                     let part = (t - start) / (end - start);
                     &starts * (1.0 - part) + &ends * part
                 };
-                Moved {
-                    ends: [at(times.0), at(times.1)],
-                    values: piece.values,
-                }
+                Some([at(times.0), at(times.1)])
+            } else {
+                None
+            };
+            let moved = moved.map(|ends| Moved {
+                ends,
+                values: piece.values,
             });
             inside.push(Inside {
                 times,

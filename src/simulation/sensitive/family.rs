@@ -209,6 +209,7 @@ impl Carrying {
                 times: element.nodes,
                 length: element.h,
                 slopes: InsideSlopes {
+                    ends: <[Vec<f64>; 2]>::default(),
                     start: rows(&start),
                     coefficients: rows(&slopes),
                 },

@@ -7,15 +7,21 @@ use alloc::vec::Vec;
 use core::cell::RefCell;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+/// A number by whose sign a kernel may choose a branch: `f64`, or a dual number, which gives the slopes of switching
+/// functions as well.
+pub(crate) trait Signed: Real<Mask = bool> {}
+
+impl<R: Real<Mask = bool>> Signed for R {}
+
 /// Collects the switching functions in the order in which a kernel evaluates them, and which of them have decided which
 /// results.
 #[derive(Debug)]
-pub(crate) struct Log(RefCell<Notes>);
+pub(crate) struct Log<R = f64>(RefCell<Notes<R>>);
 
 #[derive(Debug)]
-struct Notes {
+struct Notes<R> {
     /// The values of the switching functions.
-    values: Vec<f64>,
+    values: Vec<R>,
     /// The records of decisions that do not fit into the bits of [`Origin`].
     deciders: Vec<Decider>,
 }
@@ -39,9 +45,9 @@ pub(crate) struct Origin {
     late: Option<usize>,
 }
 
-impl Log {
+impl<R: Signed> Log<R> {
     /// An empty log, in memory that may be reused.
-    pub(crate) fn new(mut values: Vec<f64>) -> Self {
+    pub(crate) fn new(mut values: Vec<R>) -> Self {
         values.clear();
         Self(RefCell::new(Notes {
             values,
@@ -50,13 +56,16 @@ impl Log {
     }
 
     /// The union of the origins of several numbers.
-    pub(crate) fn deciding<'a>(&self, numbers: impl Iterator<Item = &'a Watched<'a>>) -> Origin {
+    pub(crate) fn deciding<'a>(&self, numbers: impl Iterator<Item = &'a Watched<'a, R>>) -> Origin
+    where
+        R: 'a,
+    {
         numbers.fold(Origin::default(), |all, one| self.both(all, one.origin))
     }
 
     /// The values of all switching functions. Those that are not in the origin, and so decide nothing in the results,
     /// are replaced by zero, which has no sign: for example the |x| in max(|x| − a, 0) near x = 0.
-    pub(crate) fn decisive(self, Origin { early, late }: Origin) -> Vec<f64> {
+    pub(crate) fn decisive(self, Origin { early, late }: Origin) -> Vec<R> {
         let Notes {
             mut values,
             deciders,
@@ -79,14 +88,19 @@ impl Log {
                 Some(late) => decides[late],
             };
             if !decides {
-                *value = 0.0;
+                *value = R::from_f64(0.0);
             }
         }
         values
     }
 
+    /// The values of all switching functions.
+    pub(crate) fn values(self) -> Vec<R> {
+        self.0.into_inner().values
+    }
+
     #[inline]
-    fn note(&self, value: f64) -> Origin {
+    fn note(&self, value: R) -> Origin {
         let mut notes = self.0.borrow_mut();
         let switch = notes.values.len();
         notes.values.push(value);
@@ -122,18 +136,18 @@ impl Log {
 
 /// A number; those that depend on the time or the state refer to the log.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Watched<'a> {
-    value: f64,
-    log: Option<&'a Log>,
+pub(crate) struct Watched<'a, R = f64> {
+    value: R,
+    log: Option<&'a Log<R>>,
     /// The decisions that led to the branch in which it was computed.
     origin: Origin,
     /// Whether it is constant in that branch.
     is_fixed: bool,
 }
 
-impl<'a> Watched<'a> {
+impl<'a, R: Signed> Watched<'a, R> {
     #[inline]
-    pub(crate) fn new(value: f64, log: &'a Log) -> Self {
+    pub(crate) fn new(value: R, log: &'a Log<R>) -> Self {
         Self {
             value,
             log: Some(log),
@@ -143,12 +157,22 @@ impl<'a> Watched<'a> {
     }
 
     #[inline]
-    fn of(self, value: f64) -> Self {
+    fn constant(value: R) -> Self {
+        Self {
+            value,
+            log: None,
+            origin: Origin::default(),
+            is_fixed: true,
+        }
+    }
+
+    #[inline]
+    fn of(self, value: R) -> Self {
         Self { value, ..self }
     }
 
     #[inline]
-    fn with(self, other: Self, value: f64) -> Self {
+    fn with(self, other: Self, value: R) -> Self {
         let log = self.log.or(other.log);
         Self {
             value,
@@ -160,7 +184,7 @@ impl<'a> Watched<'a> {
 
     /// The same number, with the sign of `value` as a further decision.
     #[inline]
-    fn decided_by(self, value: f64) -> Self {
+    fn decided_by(self, value: R) -> Self {
         let Some(log) = self.log else { return self };
         Self {
             origin: log.both(self.origin, log.note(value)),
@@ -182,24 +206,25 @@ impl<'a> Watched<'a> {
     /// Whether a product with it vanishes.
     #[inline]
     fn vanishes(self) -> bool {
-        self.is_fixed && self.value == 0.0
+        let zero = R::from_f64(0.0);
+        self.is_fixed && self.value.less_or_equal(zero) && zero.less_or_equal(self.value)
     }
 }
 
 /// The result of a comparison.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Choice<'a> {
+pub(crate) struct Choice<'a, R = f64> {
     holds: bool,
     /// A number that has been decided by nothing else.
-    decided: Watched<'a>,
+    decided: Watched<'a, R>,
 }
 
-impl<'a> Choice<'a> {
+impl<'a, R: Signed> Choice<'a, R> {
     #[inline]
-    fn by(holds: bool, a: Watched<'a>, b: Watched<'a>) -> Self {
+    fn by(holds: bool, a: Watched<'a, R>, b: Watched<'a, R>) -> Self {
         let plain = Watched {
             origin: Origin::default(),
-            ..a.with(b, 0.0)
+            ..a.with(b, R::from_f64(0.0))
         };
         Self {
             holds,
@@ -210,7 +235,7 @@ impl<'a> Choice<'a> {
 
 macro_rules! operators {
     ($($trait:ident $method:ident $operator:tt;)*) => {
-        $(impl $trait for Watched<'_> {
+        $(impl<R: Signed> $trait for Watched<'_, R> {
             type Output = Self;
             #[inline]
             fn $method(self, other: Self) -> Self {
@@ -226,7 +251,7 @@ operators! {
     Div div /;
 }
 
-impl Mul for Watched<'_> {
+impl<R: Signed> Mul for Watched<'_, R> {
     type Output = Self;
     #[inline]
     fn mul(self, other: Self) -> Self {
@@ -242,20 +267,20 @@ impl Mul for Watched<'_> {
     }
 }
 
-impl Neg for Watched<'_> {
+impl<R: Signed> Neg for Watched<'_, R> {
     type Output = Self;
     fn neg(self) -> Self {
         self.of(-self.value)
     }
 }
 
-impl AddAssign for Watched<'_> {
+impl<R: Signed> AddAssign for Watched<'_, R> {
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl SubAssign for Watched<'_> {
+impl<R: Signed> SubAssign for Watched<'_, R> {
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
@@ -269,24 +294,28 @@ macro_rules! smooth {
     };
 }
 
-impl<'a> Real for Watched<'a> {
-    type Mask = Choice<'a>;
+impl<'a, R: Signed> Real for Watched<'a, R> {
+    type Mask = Choice<'a, R>;
 
     #[inline]
     fn from_f64(value: f64) -> Self {
-        Self {
-            value,
-            log: None,
-            origin: Origin::default(),
-            is_fixed: true,
-        }
+        Self::constant(R::from_f64(value))
+    }
+
+    #[inline]
+    fn parameter(self, index: usize, value: f64) -> Self {
+        Self::constant(self.value.parameter(index, value))
     }
 
     smooth!(sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp ln sqrt);
 
     #[inline]
     fn map(self, function: &mut dyn FnMut(f64) -> f64) -> Self {
-        self.of(function(self.value))
+        self.of(self.value.map(function))
+    }
+    #[inline]
+    fn map_with_derivatives(self, derivatives: &mut dyn FnMut(u32, f64) -> f64) -> Self {
+        self.of(self.value.map_with_derivatives(derivatives))
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
@@ -325,24 +354,24 @@ impl<'a> Real for Watched<'a> {
     }
     #[inline]
     fn min(self, other: Self) -> Self {
-        let chosen = Self::chosen(self.value < other.value, self, other);
+        let chosen = Self::chosen(self.value.less(other.value), self, other);
         chosen.of(Real::min(self.value, other.value))
     }
     #[inline]
     fn max(self, other: Self) -> Self {
-        let chosen = Self::chosen(self.value > other.value, self, other);
+        let chosen = Self::chosen(other.value.less(self.value), self, other);
         chosen.of(Real::max(self.value, other.value))
     }
     #[inline]
-    fn less(self, other: Self) -> Choice<'a> {
-        Choice::by(self.value < other.value, self, other)
+    fn less(self, other: Self) -> Choice<'a, R> {
+        Choice::by(self.value.less(other.value), self, other)
     }
     #[inline]
-    fn less_or_equal(self, other: Self) -> Choice<'a> {
-        Choice::by(self.value <= other.value, self, other)
+    fn less_or_equal(self, other: Self) -> Choice<'a, R> {
+        Choice::by(self.value.less_or_equal(other.value), self, other)
     }
     #[inline]
-    fn select(mask: Choice<'a>, then: Self, otherwise: Self) -> Self {
+    fn select(mask: Choice<'a, R>, then: Self, otherwise: Self) -> Self {
         let chosen = if mask.holds { then } else { otherwise };
         let decided = chosen.with(mask.decided, chosen.value);
         Self {

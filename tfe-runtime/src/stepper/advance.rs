@@ -2,6 +2,7 @@
 
 use super::any::AnyStepper;
 use super::common::Common;
+use super::piece::Ends;
 use super::setup::Stepper;
 use crate::constrained::trail::Of;
 use crate::cut::{Halving, Instant};
@@ -312,8 +313,13 @@ where
         (scheme.points(), scheme.has_ends())
     }
 
-    fn crossed(&mut self) {
+    fn crossed(&mut self, switch: usize) {
         self.common.carried.memory.statistics.kinks += 1;
+        self.common.last_piece_ends(Ends::Root(switch));
+    }
+
+    fn stepped_over(&mut self) {
+        self.common.last_piece_ends(Ends::Behind);
     }
 
     fn cuts(&self) -> bool {

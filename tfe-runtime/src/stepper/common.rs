@@ -1,7 +1,7 @@
 //! What steppers of all models with one number of coordinates have in common.
 
 use super::carried::Carried;
-use super::piece::Piece;
+use super::piece::{Ends, Piece};
 use crate::backwards::Backwards;
 use crate::condense::Direction;
 use crate::constrained::Foreseen;
@@ -237,12 +237,20 @@ impl<const N: usize> Common<N> {
         if let Some(last) = self.carried.memory.last {
             self.carried.pieces.push(Piece {
                 last,
+                ends: Ends::Still,
                 impulses,
                 dense,
                 independence: self.carried.memory.independence,
                 numbers: self.carried.numbers.clone(),
                 pivots: self.carried.pivots.clone(),
             });
+        }
+    }
+
+    /// Tells what determines the time of the end of the last piece.
+    pub(super) fn last_piece_ends(&mut self, ends: Ends) {
+        if let Some(piece) = self.carried.pieces.last_mut() {
+            piece.ends = ends;
         }
     }
 
@@ -257,10 +265,22 @@ impl<const N: usize> Common<N> {
         self.carried.skipped = false;
     }
 
+    /// The length of the last step from the start of a piece on.
+    fn length_from(&self, piece: usize) -> f64 {
+        self.carried.pieces[piece..]
+            .iter()
+            .map(|one| one.last.h)
+            .sum()
+    }
+
+    /// The length of a piece as a part of what is left of the step at its start.
+    pub(super) fn part_of_rest(&self, piece: usize) -> f64 {
+        self.carried.pieces[piece].last.h / self.length_from(piece)
+    }
+
     /// The directions of a piece of the last step, as fractions of those of the whole step.
     pub(super) fn of_piece(&self, directions: &[Direction], piece: usize) -> Vec<Direction> {
-        let begin = self.carried.pieces[0].last.t;
-        let length: f64 = self.carried.pieces.iter().map(|piece| piece.last.h).sum();
+        let (begin, length) = (self.carried.pieces[0].last.t, self.length_from(0));
         let Last { t, h, .. } = self.carried.pieces[piece].last;
         let own = |direction: &Direction| Direction {
             time: direction.time + (t - begin) / length * direction.length,

@@ -26,6 +26,31 @@ fn chain(columns: usize, (rows, before): (&[f64], &[f64]), chained: &mut [f64]) 
     }
 }
 
+/// A matrix, given by rows, times one with as many rows as told.
+pub(super) fn product(rows: &[f64], (inner, matrix): (usize, &[f64])) -> Vec<f64> {
+    let columns = matrix.len() / inner;
+    let mut product = vec![0.0; rows.len() / inner * columns];
+    for (row, sums) in rows
+        .chunks_exact(inner)
+        .zip(product.chunks_exact_mut(columns))
+    {
+        for (factor, one) in row.iter().zip(matrix.chunks_exact(columns)) {
+            add_multiple(sums, *factor, one);
+        }
+    }
+    product
+}
+
+/// Writes the matrix of a step to where it was asked for.
+fn write(found: &[f64], matrix: &mut [f64]) -> Result<(), TransitionError> {
+    let (needed, given) = (found.len(), matrix.len());
+    let Some(matrix) = matrix.get_mut(..needed) else {
+        return Err(TransitionError::Shape { needed, given });
+    };
+    matrix.copy_from_slice(found);
+    Ok(())
+}
+
 /// Adds the direct derivatives by the start of a loss that depends on the inside.
 fn add_start(inside: Option<&InsideLoss>, lambda: &mut [f64]) {
     if let Some(InsideLoss { start, .. }) = inside {
@@ -49,7 +74,7 @@ where
     /// Writes the derivative of the end of the last step by its start and by g directions, 2N × (2N + g), row by row,
     /// the first columns and all rows ordered (p, q).
     ///
-    /// Impulses stay at their times, and so do the crossings of kinks at which the step was cut.
+    /// Impulses stay at their times; the crossings of kinks at which the step was cut move with the motion.
     ///
     /// # Errors
     /// As [`transition`](Self::transition).
@@ -89,13 +114,13 @@ where
         if self.common.carried.pieces.is_empty() && inside.is_none() {
             return self.linearise_last(directions, matrix, None);
         }
+        if self.has_arcs() {
+            let ends = self.linearise_arcs(directions, inside)?;
+            return write(&ends, matrix);
+        }
         let width = 2 * N;
         let columns = width + directions.len();
         let needed = width * columns;
-        if matrix.len() < needed {
-            let given = matrix.len();
-            return Err(TransitionError::Shape { needed, given });
-        }
         let mut product = vec![0.0; needed];
         for row in 0..width {
             product[row * columns + row] = 1.0;
@@ -119,6 +144,7 @@ where
                 inside.push(InsideSlopes {
                     start: product.clone(),
                     coefficients,
+                    ends: [Vec::new(), Vec::new()],
                 });
             }
             if self.common.carried.pieces.is_empty() {
@@ -128,8 +154,7 @@ where
             chain(columns, (&factor, &product), &mut next);
             core::mem::swap(&mut product, &mut next);
         }
-        matrix[..needed].copy_from_slice(&product);
-        Ok(())
+        write(&product, matrix)
     }
 
     /// Multiplies the matrix of [`linearise`](Self::linearise) by the row `lambda`, 2N numbers ordered (p, q), from the
@@ -170,6 +195,9 @@ where
         if self.common.carried.pieces.is_empty() {
             return self.adjoint_of_last(directions, inside.first(), lambda, by_direction);
         }
+        if self.has_arcs() {
+            return self.adjoint_of_arcs(directions, inside, (lambda, by_direction));
+        }
         for piece in (0..self.common.carried.pieces.len()).rev() {
             let own = self.common.of_piece(directions, piece);
             self.common.recall(piece);
@@ -180,7 +208,7 @@ where
         Ok(())
     }
 
-    fn linearise_last(
+    pub(super) fn linearise_last(
         &mut self,
         directions: &[Direction],
         matrix: &mut [f64],

@@ -6,10 +6,22 @@ use crate::method::{Impulse, Last};
 use crate::model::State;
 use alloc::vec::Vec;
 
+/// What determines the time of the end of a piece.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Ends {
+    /// A part of the step.
+    Still,
+    /// The root of a switching function, given by its index.
+    Root(usize),
+    /// The end of the piece before, which ends at such a root: the length of this one is fixed.
+    Behind,
+}
+
 /// A piece of a step that was cut.
 #[derive(Clone, Debug)]
 pub(super) struct Piece<const N: usize> {
     pub(super) last: Last<N>,
+    pub(super) ends: Ends,
     pub(super) impulses: Vec<Impulse<N>>,
     pub(super) dense: DenseElement<N>,
     pub(super) independence: Option<[Independence; 2]>,

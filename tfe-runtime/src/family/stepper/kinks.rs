@@ -116,7 +116,7 @@ impl<M: Model> Kinked for Stepper<'_, M> {
         (scheme.points(), scheme.has_ends())
     }
 
-    fn crossed(&mut self) {
+    fn crossed(&mut self, _: usize) {
         self.statistics_mut().kinks += 1;
     }
 
