@@ -64,7 +64,7 @@ const ELEMENTS: [Element; 5] = [
     event(level) = y - level,
 )]
 #[derive(Clone)]
-struct Rattle {
+pub struct Rattle {
     k: f64,
     s: f64,
     gap: f64,
@@ -90,6 +90,11 @@ const START: ([f64; 2], [f64; 2]) = ([0.5, -0.2], [0.3, 0.9]);
 const SPAN: f64 = 3.0;
 
 impl Rattle {
+    /// With a force that pulls towards the line where it jumps.
+    pub fn with_valley() -> Self {
+        Self { b: -0.4, ..RATTLE }
+    }
+
     fn with(name: &str, value: f64) -> Self {
         let mut model = RATTLE;
         *match name {

@@ -39,6 +39,15 @@ impl Landing {
         self.change.abs() < SHORTEST * h.abs()
     }
 
+    /// Ends the arc earlier, each time by twice as much: beside a jump an iteration may converge in one trial and not in
+    /// the next one of the same length. False if it would not be near the root any more.
+    fn retreats(&mut self, by: &mut f64, h: f64) -> bool {
+        self.length -= *by;
+        self.change += *by;
+        *by *= 2.0;
+        self.length > 0.0 && self.is_near(h)
+    }
+
     fn arc(&self, h: f64, margin: f64) -> Arc {
         let margin = if margin > 0.0 || self.is_near(h) && self.change > 0.0 {
             self.change.max(margin)
@@ -142,6 +151,8 @@ struct LengthSearch {
     /// The arc that came nearest to a root without crossing it; it is used if none comes nearer.
     nearest: Option<Landing>,
     is_to_settle: bool,
+    /// How much earlier it ends if it fails when it is solved again.
+    retreat: f64,
     /// A length that is accepted without a search.
     only: Option<f64>,
 }
@@ -169,6 +180,7 @@ impl LengthSearch {
             bad: f64::INFINITY,
             nearest: None,
             is_to_settle: false,
+            retreat: resolution,
             only: None,
         }
     }
@@ -203,6 +215,12 @@ impl LengthSearch {
     /// # Errors
     /// The `error`, if no shorter arc may succeed.
     fn shorten(&mut self, error: StepError) -> Result<(), StepError> {
+        if let Some(landing) = self.nearest.as_mut().filter(|_| self.is_to_settle)
+            && is_of_the_iteration(&error)
+            && landing.retreats(&mut self.retreat, self.h)
+        {
+            return Ok(());
+        }
         self.bad = self.length;
         let Self { good, bad, .. } = *self;
         let least = 2.0 * self.resolution;
