@@ -81,7 +81,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             let motion = Motion::from_start(&*self.model, span.start, &start);
             return Err(RunError::new(kind, motion));
         }
-        let mut run = self.clone();
+        let mut run = self.cut_at_kinks();
         run.look_at(loss, &span);
         if !run.events.is_empty() {
             return run.record_every(1).forwards(start, span, loss);

@@ -41,14 +41,15 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         start: State<N>,
         span: Range<f64>,
     ) -> Result<Linearised<N>, RunError<N>> {
+        let run = self.cut_at_kinks();
         let mut matrices = Matrices {
-            tangents: Tangents::new(self.model.clone(), self.chosen(), &[]),
+            tangents: Tangents::new(run.model.clone(), run.chosen(), &[]),
             is_across: false,
             entries: vec![0.0; 4 * N * N],
             transitions: Vec::new(),
             bases: Vec::new(),
         };
-        let motion = self.drive(start, &span, identity, Some(&mut matrices))?;
+        let motion = run.drive(start, &span, identity, Some(&mut matrices))?;
         matrices.close();
         let Matrices {
             tangents,

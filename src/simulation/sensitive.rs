@@ -47,10 +47,11 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
     ) -> Result<Sensitive<N>, RunError<N>> {
         let all: Vec<_> = (0..self.model.parameters()).collect();
-        let tangents = self.tangents(&all);
-        match self.record_every {
-            1 => self.differentiated(start, span, tangents.with_inside()),
-            _ => self.differentiated(start, span, tangents),
+        let run = self.cut_at_kinks();
+        let tangents = run.tangents(&all);
+        match run.record_every {
+            1 => run.differentiated(start, span, tangents.with_inside()),
+            _ => run.differentiated(start, span, tangents),
         }
     }
 
@@ -72,7 +73,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
         parameters: &[usize],
     ) -> Result<Sensitive<N>, RunError<N>> {
-        self.differentiated(start, span, self.tangents(parameters))
+        let run = self.cut_at_kinks();
+        let tangents = run.tangents(parameters);
+        run.differentiated(start, span, tangents)
     }
 
     fn tangents(&self, parameters: &[usize]) -> Tangents<'m, M, N> {

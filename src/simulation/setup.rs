@@ -255,11 +255,11 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
     /// the crossings. A motion that would slide along a jump is an error,
     /// [`StepError::Slides`](crate::runtime::StepError::Slides).
     ///
-    /// [`run`](Self::run), [`steps`](Self::steps) and [`run_estimated`](Self::run_estimated) cut steps at kinks only
-    /// after `at_kinks(true)`; runs with an [`accuracy`](Self::accuracy) do so unless `at_kinks(false)` was called.
-    /// `run_linearised`, `run_sensitive`, `gradient`, `hessian` and linearised [sections](Self::section) include the
-    /// change of the times at which steps are cut (T-167); for models of run-time length, derivatives across a kink fail
-    /// with [`RunErrorKind::Unsupported`].
+    /// [`run`](Self::run), [`steps`](Self::steps), [`run_estimated`](Self::run_estimated) and [sections](Self::section)
+    /// cut steps at kinks only after `at_kinks(true)`. Runs with an [`accuracy`](Self::accuracy), `run_linearised`,
+    /// `run_sensitive`, `gradient` and `hessian` do so unless `at_kinks(false)` was called. Derivatives include the change
+    /// of the times at which steps are cut (T-167); without cuts they are wrong across jumps. For models of run-time
+    /// length, derivatives across a kink at which a step is cut fail with [`RunErrorKind::Unsupported`].
     ///
     /// ```
     /// use tfe::prelude::*;
@@ -338,6 +338,14 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
             control: self.control,
             at_kinks: self.at_kinks == Some(true),
         }
+    }
+
+    /// The same with steps cut at kinks unless the user has decided otherwise: derivatives across a jump are wrong without
+    /// the change of the time at which the motion crosses it.
+    pub(super) fn cut_at_kinks(&self) -> Self {
+        let mut run = self.clone();
+        run.at_kinks.get_or_insert(true);
+        run
     }
 
     pub(super) fn chosen_element(&self) -> Element {

@@ -54,6 +54,24 @@ const ELEMENTS: [Element; 5] = [
     Element::mixed(6),
 ];
 
+/// Derivatives without the change of the time of a jump are wrong: steps are cut there unless that is refused.
+#[test]
+fn steps_are_cut_at_kinks_by_default() {
+    let start = VALLEY.state([0.6], [0.0]);
+    let by_g = |run: Simulation<'_, Valley, 1>| {
+        let run = run.step(0.3);
+        let sensitive = run.run_sensitive(start, 0.0..2.0);
+        let loss = Loss::output_at_end("place");
+        let (_, gradient) = run.gradient(start, 0.0..2.0, &loss).expect("a gradient");
+        let found = sensitive.expect("derivatives").by("g").last().q[0];
+        assert!((gradient.by("g") - found).abs() <= 1e-13);
+        found
+    };
+    let cut = by_g(Simulation::new(&VALLEY).at_kinks(true));
+    assert_eq!(by_g(Simulation::new(&VALLEY)), cut);
+    assert!((by_g(Simulation::new(&VALLEY).at_kinks(false)) - cut).abs() > 0.1);
+}
+
 /// Two coordinates with a gap, a jump of a force by place and time, and dry friction; velocities depend on both.
 #[dynamics(
     coordinates(x, y),
@@ -402,4 +420,67 @@ fn derivatives_across_kinks_of_a_hamiltonian_are_those_of_the_run() {
         let off = larger((found.q[0] - exact[0]).abs(), (found.p[0] - exact[1]).abs());
         assert!(off <= 1e-9, "{name}: {off:.1e}");
     }
+}
+
+/// An oscillator with a stop and dry friction that is driven so that it never sticks.
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2 - k/2*x^2 - s/2*max(x - gap, 0)^2 + a*x*cos(w*t),
+    force(x) = -c*dot(x) - f*sign(dot(x)),
+    output(place) = x,
+)]
+struct Driven {
+    k: f64,
+    s: f64,
+    gap: f64,
+    a: f64,
+    w: f64,
+    c: f64,
+    f: f64,
+}
+
+const DRIVEN: Driven = Driven {
+    k: 1.0,
+    s: 5.0,
+    gap: 0.2,
+    a: 0.8,
+    w: 1.1,
+    c: 0.15,
+    f: 0.05,
+};
+
+/// Multipliers of an orbit with dry friction: trace and determinant are those of differences of the motion over a period.
+#[test]
+fn multipliers_of_an_orbit_with_dry_friction_are_those_of_its_motion() {
+    let period = std::f64::consts::TAU / DRIVEN.w;
+    let simulation = Simulation::new(&DRIVEN).step(period / 40.0).at_kinks(true);
+    let orbit = PeriodicOrbit::of_simulation(&simulation).period(period);
+    let orbit = orbit
+        .guess_from(DRIVEN.state([0.5], [0.1]))
+        .solve()
+        .expect("an orbit");
+    let start = orbit.start();
+    let end = |q: f64, p: f64| {
+        let motion = simulation
+            .run(State { q: [q], p: [p] }, 0.0..period)
+            .expect("runs");
+        [motion.last().q[0], motion.last().p[0]]
+    };
+    let by_q = difference_over(DISTANCE, |q| end(q, start.p[0]), start.q[0]);
+    let by_p = difference_over(DISTANCE, |p| end(start.q[0], p), start.p[0]);
+    let [one, other] = orbit.multipliers() else {
+        panic!("two multipliers");
+    };
+    let (trace, product) = (one.re + other.re, (one * other).re);
+    assert!(
+        (trace - by_q[0] - by_p[1]).abs() <= 1e-9,
+        "{trace} {by_q:?} {by_p:?}"
+    );
+    let determinant = by_q[0] * by_p[1] - by_q[1] * by_p[0];
+    assert!(
+        (product - determinant).abs() <= 1e-9,
+        "{product} {determinant}"
+    );
+    // Friction contracts more than the damper alone.
+    assert!(product < (-DRIVEN.c * period).exp() - 0.05);
 }

@@ -117,7 +117,7 @@ where
             self.common.recall(number);
             let mut coefficients = Vec::new();
             let asked = inside.is_some().then_some(&mut coefficients);
-            let own = self.own_directions(directions, &mut before);
+            let own = self.own_directions(number, directions, &mut before);
             self.linearise_last(&own, &mut factor, asked)?;
             let times = self.times_of_end(number, directions, (&mut before, &factor))?;
             before.end().copy_from_slice(&times);
@@ -134,21 +134,35 @@ where
         Ok(before.state().to_vec())
     }
 
-    /// The directions of a piece: those of the step at fixed times, and the motions of its start and its end.
-    fn own_directions(&self, directions: &[Direction], before: &mut Before<N>) -> Vec<Direction> {
+    /// The directions of a piece: those of the step at fixed times, and the motions of its start and its end, if they
+    /// move: impulses have a place in the element that may not.
+    fn own_directions(
+        &self,
+        number: usize,
+        directions: &[Direction],
+        before: &mut Before<N>,
+    ) -> Vec<Direction> {
         let still = directions.iter().map(|direction| Direction {
             time: 0.0,
             length: 0.0,
             ..*direction
         });
-        // Impulses have a place in the element that may not move.
-        let is_moved = before.start().iter().any(|time| *time != 0.0);
-        let start = if is_moved {
-            START
-        } else {
-            Direction::default()
+        let moves = |times: &[f64]| times.iter().any(|time| *time != 0.0);
+        let pieces = &self.common.carried.pieces;
+        let starts = moves(before.start());
+        let ends = moves(&moved(directions, 2 * N, 1.0))
+            || number + 1 < pieces.len()
+                && (starts || matches!(pieces[number].ends, Ends::Root(_)));
+        let only = |moves, direction| {
+            if moves {
+                direction
+            } else {
+                Direction::default()
+            }
         };
-        still.chain([start, END]).collect()
+        still
+            .chain([only(starts, START), only(ends, END)])
+            .collect()
     }
 
     /// The changes of the time of the end of a piece, whose derivatives are `factor`.
