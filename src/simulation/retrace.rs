@@ -1,6 +1,5 @@
 //! Solves the elements of a recorded run once more, for their derivatives.
 
-use super::sensitive::carried::{END, START};
 use super::setup::Simulation;
 use super::trail::{Between, Element, Kicked, LONG_STEPS, Trail};
 use crate::error::RunErrorKind;
@@ -119,8 +118,8 @@ fn tell<'m, M>(
 /// The directions in which events move the ends of an element: its start, then its end.
 pub(super) fn moving(element: &Element) -> impl Iterator<Item = Direction> {
     let (starts, ends) = element.moves;
-    let start = starts.then_some(START);
-    start.into_iter().chain(ends.then_some(END))
+    let start = starts.then_some(Direction::START);
+    start.into_iter().chain(ends.then_some(Direction::END))
 }
 
 /// The error of a run one of whose elements has no derivative.

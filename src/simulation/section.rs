@@ -254,7 +254,8 @@ impl<M: Model<N>, const N: usize> Section<'_, M, N> {
     /// Computes the [transition matrix](SectionPoint::transition) of each point from now on, for the cost of a
     /// factorisation and 2N solutions in each step, and as much again at each point.
     ///
-    /// If an event sets a parameter to a value that depends on the state, the iterator ends with [`RunErrorKind::SetByState`].
+    /// Where forces jump, matrices are right after [`at_kinks(true)`](Simulation::at_kinks) only. If an event sets a parameter
+    /// to a value that depends on the state, the iterator ends with [`RunErrorKind::SetByState`].
     #[must_use]
     pub fn linearised(mut self) -> Self {
         let tangents = Tangents::new(self.model.clone(), self.chosen, &[]);

@@ -17,7 +17,7 @@ use crate::motion::{Motion, Node};
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::inside::Before;
 use crate::sensitivity::slopes::directions;
-use carried::{Along, Carried, END, Reached, START};
+use carried::{Along, Carried, Reached};
 use jump::Jump;
 use nalgebra::DMatrix;
 use std::convert::identity;
@@ -244,7 +244,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
     ) -> Result<Across, TransitionError> {
         let mut directions = self.parameters.clone();
         let before = &self.carried.before;
-        directions.extend(before.start.as_ref().map(|_| START));
+        directions.extend(before.start.as_ref().map(|_| Direction::START));
         directions.extend_from_slice(more);
         let all = 2 * N + directions.len();
         let mut entries = vec![0.0; 2 * N * all];
@@ -290,7 +290,7 @@ impl<'m, M: Model<N>, const N: usize> Tangents<'m, M, N> {
             let mut state = *severed.before;
             let length = severed.length;
             probe.advance(severed.begin, length, &mut state, severed.impulses)?;
-            let found = self.across(&mut probe, &[END]);
+            let found = self.across(&mut probe, &[Direction::END]);
             self.probe = Some(probe);
             let Across { end, more, inside } = found?;
             let reached = Reached {

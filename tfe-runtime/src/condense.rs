@@ -31,6 +31,24 @@ pub struct Direction {
     pub damping: f64,
 }
 
+impl Direction {
+    /// The start of the element moves in time, its end does not.
+    pub const START: Self = Self {
+        time: 1.0,
+        length: -1.0,
+        parameter: None,
+        damping: 0.0,
+    };
+
+    /// Only the end moves in time.
+    pub const END: Self = Self {
+        time: 0.0,
+        length: 1.0,
+        parameter: None,
+        damping: 0.0,
+    };
+}
+
 /// Checks that there is a sum for each column.
 pub(crate) fn check_sums<const N: usize>(
     directions: &[Direction],

@@ -13,23 +13,7 @@ use crate::simulation::events::value::output_slopes;
 use nalgebra::{DMatrix, RowDVector};
 use tfe_runtime::step::DenseElement;
 use tfe_runtime::transition::TransitionError;
-use tfe_runtime::{CoordinateName, Direction, InsideSlopes};
-
-/// The start of the element moves in time, its end does not.
-pub(in crate::simulation) const START: Direction = Direction {
-    time: 1.0,
-    length: -1.0,
-    parameter: None,
-    damping: 0.0,
-};
-
-/// Only the end moves in time.
-pub(in crate::simulation) const END: Direction = Direction {
-    time: 0.0,
-    length: 1.0,
-    parameter: None,
-    damping: 0.0,
-};
+use tfe_runtime::{CoordinateName, InsideSlopes};
 
 /// The derivatives at the current point of a run, and those collected so far.
 pub(in crate::simulation) struct Carried {

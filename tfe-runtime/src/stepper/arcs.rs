@@ -11,22 +11,6 @@ use crate::model::{Model, State};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The start of a piece moves in time, its end does not.
-const START: Direction = Direction {
-    time: 1.0,
-    length: -1.0,
-    parameter: None,
-    damping: 0.0,
-};
-
-/// Only the end moves in time.
-const END: Direction = Direction {
-    time: 0.0,
-    length: 1.0,
-    parameter: None,
-    damping: 0.0,
-};
-
 /// What the derivatives of a piece are multiplied by: the changes of its start (p, q), of the directions themselves, and of
 /// the times of its start and its end, a row for each, by the start of the step and by directions.
 struct Before<const N: usize> {
@@ -161,7 +145,7 @@ where
             }
         };
         still
-            .chain([only(starts, START), only(ends, END)])
+            .chain([only(starts, Direction::START), only(ends, Direction::END)])
             .collect()
     }
 
