@@ -11,6 +11,7 @@ mod control;
 mod convergence;
 mod derivative;
 mod error;
+mod kinks;
 mod mesh;
 mod newton;
 mod resolved;
@@ -27,6 +28,7 @@ pub(crate) use convergence::size;
 #[cfg(feature = "sparse")]
 pub(crate) use convergence::{Convergence, Size, sizes};
 pub(crate) use derivative::derivatives;
+pub(crate) use kinks::crossed_kinks;
 pub(crate) use mesh::Mesh;
 pub(crate) use newton::{Assembly, By, Iterate, Problem};
 pub(crate) use solution::Solution;

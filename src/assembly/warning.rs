@@ -1,5 +1,6 @@
 //! What makes the solution of an assembled problem doubtful.
 
+use crate::numbers::Short;
 use std::fmt;
 
 /// What makes an orbit or a boundary-value motion doubtful although its equations are solved.
@@ -16,11 +17,29 @@ pub enum MeshWarning {
         /// singular on elements of half the length.
         change: f64,
     },
+    /// A force has a kink or a jump inside an element, because a `select`, `abs`, `sign`, `min` or `max` changes its
+    /// branch there. Elements then lose their order, and where the force jumps, multipliers and derivatives are wrong: the
+    /// change of the time of the jump is missing. [`PeriodicOrbit::of_simulation`](crate::PeriodicOrbit::of_simulation)
+    /// ends elements there.
+    KinksCrossed {
+        /// The start of the first such element.
+        time: f64,
+    },
 }
 
 impl fmt::Display for MeshWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self::Unresolved { elements, change } = self;
+        let (elements, change) = match self {
+            Self::Unresolved { elements, change } => (elements, change),
+            Self::KinksCrossed { time } => {
+                return write!(
+                    f,
+                    "a force has a kink or a jump inside an element, first behind t = {}: errors fall more slowly with the number of elements, and \
+                     where it jumps, multipliers and derivatives are wrong; `PeriodicOrbit::of_simulation(&simulation)` ends elements there",
+                    Short(*time)
+                );
+            }
+        };
         let noun = if *elements == 1 {
             "element does"
         } else {

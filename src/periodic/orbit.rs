@@ -135,7 +135,7 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
     }
 
     /// What makes the orbit doubtful: whether elements of half the length change it, by one correction of Newton's
-    /// method. Orbits of a [branch](crate::Branch) have [warnings of their own](crate::Branch::warnings), and those of
+    /// method, and whether nodes next to each other lie on both sides of a kink or a jump of a force. Orbits of a [branch](crate::Branch) have [warnings of their own](crate::Branch::warnings), and those of
     /// models of run-time length have none.
     pub fn warnings(&self) -> &[MeshWarning] {
         &self.warnings

@@ -6,7 +6,9 @@ use super::orbit::Orbit;
 use super::phase::{Period, Phase};
 use super::problem::{Global, Periodic, inertia_of};
 use super::rest::{Extent, is_at_rest, may_rest};
-use crate::assembly::{Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshWarning};
+use crate::assembly::{
+    Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshWarning, crossed_kinks,
+};
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Motion;
 use crate::simulation::Simulation;
@@ -287,7 +289,11 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         let along = |t: f64| along_motion(self.model, &motion, t);
         let fine = (&problem.halved(), 2 * self.elements);
         let unknowns = (iterate.globals.clone(), problem.dense());
-        Assembly::doubts(self.element, fine, unknowns, along)
+        let mut warnings = Assembly::doubts(self.element, fine, unknowns, along);
+        let times = problem.mesh.times(problem.start, problem.period);
+        let nodes = times.zip(iterate.nodes.iter().copied());
+        warnings.extend(crossed_kinks(self.model, nodes));
+        warnings
     }
 
     /// Solves the equations.

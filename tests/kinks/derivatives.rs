@@ -2,7 +2,8 @@
 
 use crate::differences::difference_over;
 use crate::largest::larger;
-use tfe::nalgebra::DMatrix;
+use tfe::MeshWarning;
+use tfe::nalgebra::{Complex, DMatrix};
 use tfe::prelude::*;
 use tfe::runtime::{Family, Rule};
 use tfe::sensitivity::Loss;
@@ -482,5 +483,18 @@ fn multipliers_of_an_orbit_with_dry_friction_are_those_of_its_motion() {
         "{product} {determinant}"
     );
     // Friction contracts more than the damper alone.
-    assert!(product < (-DRIVEN.c * period).exp() - 0.05);
+    let of_damper = (-DRIVEN.c * period).exp();
+    assert!(product < of_damper - 0.05);
+    // Elements of an assembled orbit do not end at kinks, and it has the product of the damper: this is told.
+    let across = PeriodicOrbit::of(&DRIVEN).period(period).guess_from(start);
+    let across = across.elements(400).solve().expect("an orbit");
+    let product: Complex<f64> = across.multipliers().iter().product();
+    assert!((product.re - of_damper).abs() <= 1e-9);
+    let is_told = |one: &MeshWarning| matches!(one, MeshWarning::KinksCrossed { .. });
+    assert!(across.warnings().iter().any(is_told));
+    assert!(
+        across
+            .to_string()
+            .contains("`PeriodicOrbit::of_simulation(&simulation)`")
+    );
 }

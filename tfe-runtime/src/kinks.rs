@@ -103,6 +103,22 @@ where
     true
 }
 
+/// The values of the functions g(t, q, z) by whose signs the kernels of a model choose branches at a state, with z = v for
+/// a Lagrangian and z = p for a Hamiltonian, in an order that is always the same. One that decides nothing there is zero;
+/// a model that is smooth has none. `None` where there is no velocity.
+#[must_use]
+pub fn switching_functions<M, const N: usize>(
+    model: &M,
+    t: f64,
+    state: &crate::State<N>,
+) -> Option<Vec<f64>>
+where
+    M: Model<N>,
+{
+    let mut values = Vec::new();
+    switches(model, t, state, &mut values).then_some(values)
+}
+
 /// The numbers, with a log of their comparisons.
 fn watch<'a, const N: usize>(numbers: &[f64; N], log: &'a Log) -> [Watched<'a>; N] {
     numbers.map(|number| Watched::new(number, log))

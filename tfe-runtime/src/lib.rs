@@ -102,6 +102,8 @@ pub use error::{ConstraintError, LegendreError, StepError};
 pub use input::{InputFailure, InputPanicked};
 #[cfg(feature = "alloc")]
 pub use inside::{InsideLoss, InsideSlopes};
+#[cfg(feature = "alloc")]
+pub use kinks::switching_functions;
 pub use lanes::Lanes;
 pub use model::{
     By, Constraint, ConstraintKind, ConstraintSecond, CoordinateName, Facts, First, Form, Model,

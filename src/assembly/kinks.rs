@@ -1,0 +1,25 @@
+//! Kinks and jumps of forces inside the elements of a mesh, which cannot end there.
+
+use super::warning::MeshWarning;
+use tfe_runtime::{Model, State, switching_functions};
+
+/// The warning for the first element at whose ends a switching function of the model has different signs.
+pub(crate) fn crossed_kinks<M: Model<N>, const N: usize>(
+    model: &M,
+    nodes: impl Iterator<Item = (f64, State<N>)>,
+) -> Option<MeshWarning> {
+    if const { M::FACTS.smooth } {
+        return None;
+    }
+    let mut last: Option<(f64, Vec<f64>)> = None;
+    for (t, state) in nodes {
+        let here = switching_functions(model, t, &state)?;
+        if let Some((time, before)) = &last
+            && before.iter().zip(&here).any(|(a, b)| a * b < 0.0)
+        {
+            return Some(MeshWarning::KinksCrossed { time: *time });
+        }
+        last = Some((t, here));
+    }
+    None
+}
