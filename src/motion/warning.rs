@@ -69,9 +69,10 @@ pub enum Warning {
         count: usize,
     },
     /// Forces of the model have kinks or jumps, and steps do not [end](crate::Simulation::at_kinks) there. Elements
-    /// that cross one lose their order of accuracy, and so do both runs that the error estimate compares.
+    /// that cross one lose their order of accuracy, and so do both runs that an error estimate compares. Derivatives across
+    /// a jump are wrong: the change of the time at which the motion crosses it is missing.
     ///
-    /// Given by runs with an error estimate only.
+    /// Given by runs with an error estimate or with derivatives only.
     KinksCrossed,
     /// The step is too long to resolve the motion: an element was solved again as three elements of a third of its
     /// length (nine of a ninth if the element had been cut), and the two results differ, at its end or, continued, at
@@ -146,7 +147,7 @@ impl fmt::Display for Warning {
                 f.write_str(": take a shorter step, or look for a singular point of the model")
             }
             Self::KinksCrossed => f.write_str(
-                "forces of the model have kinks or jumps inside steps: elements lose their order of accuracy there, and errors fall more slowly with the step size than for smooth forces; `at_kinks(true)` ends steps there",
+                "forces of the model have kinks or jumps inside steps: elements lose their order of accuracy there, and errors fall more slowly with the step size than for smooth forces; derivatives across a jump are wrong; `at_kinks(true)` ends steps there",
             ),
             Self::Unresolved {
                 time,

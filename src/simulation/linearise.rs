@@ -9,6 +9,7 @@ use super::setup::Simulation;
 use crate::constraints::allowed;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
+use crate::motion::Warning;
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
@@ -49,7 +50,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             transitions: Vec::new(),
             bases: Vec::new(),
         };
-        let motion = run.drive(start, &span, identity, Some(&mut matrices))?;
+        let mut motion = run.drive(start, &span, identity, Some(&mut matrices))?;
+        if run.crosses_kinks() {
+            motion.add_warning(Warning::KinksCrossed);
+        }
         matrices.close();
         let Matrices {
             tangents,

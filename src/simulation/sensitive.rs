@@ -13,7 +13,7 @@ use super::kind::Chosen;
 use super::setup::Simulation;
 use crate::constraints::tangent_basis;
 use crate::error::{RunError, RunErrorKind};
-use crate::motion::{Motion, Node};
+use crate::motion::{Motion, Node, Warning};
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::inside::Before;
 use crate::sensitivity::slopes::directions;
@@ -88,7 +88,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         span: Range<f64>,
         mut tangents: Tangents<'m, M, N>,
     ) -> Result<Sensitive<N>, RunError<N>> {
-        let motion = self.drive(start, &span, identity, Some(&mut tangents))?;
+        let mut motion = self.drive(start, &span, identity, Some(&mut tangents))?;
+        if self.crosses_kinks() {
+            motion.add_warning(Warning::KinksCrossed);
+        }
         Ok(tangents.into_sensitive(motion))
     }
 }

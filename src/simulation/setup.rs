@@ -353,6 +353,13 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
     }
 }
 
+impl<M: Simulated<N, L>, const N: usize, L: Length<N>> Simulation<'_, M, N, L> {
+    /// Whether forces may have kinks or jumps inside steps.
+    pub(super) fn crosses_kinks(&self) -> bool {
+        self.at_kinks != Some(true) && !M::FACTS.smooth
+    }
+}
+
 impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// Adds an impulse: a generalized force that acts at the instant `time` and has the time integral `impulse`, one
     /// number for each coordinate, in units of that coordinate's momentum.

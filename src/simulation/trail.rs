@@ -7,7 +7,7 @@ use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{Length, RunTimeLength};
-use crate::motion::{Event, Motion, Node};
+use crate::motion::{Event, Motion, Node, Warning};
 use crate::numbers::{larger, largest};
 use std::convert::identity;
 use std::ops::{ControlFlow, Range};
@@ -307,7 +307,10 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
         if const { M::CONSTRAINED } {
             trail.last.clone_from(&start);
         }
-        let motion = self.drive(start, span, identity, Some(&mut trail))?;
+        let mut motion = self.drive(start, span, identity, Some(&mut trail))?;
+        if self.crosses_kinks() {
+            motion.add_warning(Warning::KinksCrossed);
+        }
         match Trail::<M>::refusal(&motion, call) {
             Some(kind) => Err(RunError::new(kind, motion)),
             None => Ok((motion, trail)),

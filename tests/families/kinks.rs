@@ -379,5 +379,16 @@ mod sparse {
         // Before the first kink there is nothing to refuse.
         run.run_linearised(start(), 0.0..0.1).expect("a run");
         run.gradient(start(), 0.0..0.1, &loss).expect("a gradient");
+        // Where steps are not cut, the change of the time of a jump is missing: this is told.
+        let across = Simulation::new(&beads).step(0.02);
+        let across = across
+            .run_sensitive(start(), 0.0..1.0)
+            .expect("derivatives");
+        assert!(
+            across
+                .motion()
+                .warnings()
+                .contains(&tfe::Warning::KinksCrossed)
+        );
     }
 }

@@ -2,11 +2,11 @@
 
 use crate::differences::difference_over;
 use crate::largest::larger;
-use tfe::MeshWarning;
 use tfe::nalgebra::{Complex, DMatrix};
 use tfe::prelude::*;
 use tfe::runtime::{Family, Rule};
 use tfe::sensitivity::Loss;
+use tfe::{MeshWarning, Warning};
 
 #[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - g*abs(x), output(place) = x, output(square) = x^2)]
 #[derive(Clone)]
@@ -59,18 +59,22 @@ const ELEMENTS: [Element; 5] = [
 #[test]
 fn steps_are_cut_at_kinks_by_default() {
     let start = VALLEY.state([0.6], [0.0]);
-    let by_g = |run: Simulation<'_, Valley, 1>| {
+    let by_g = |run: Simulation<'_, Valley, 1>, is_across: bool| {
         let run = run.step(0.3);
         let sensitive = run.run_sensitive(start, 0.0..2.0);
         let loss = Loss::output_at_end("place");
         let (_, gradient) = run.gradient(start, 0.0..2.0, &loss).expect("a gradient");
-        let found = sensitive.expect("derivatives").by("g").last().q[0];
+        let sensitive = sensitive.expect("derivatives");
+        let found = sensitive.by("g").last().q[0];
+        let is_told = |motion: &Motion<1>| motion.warnings().contains(&Warning::KinksCrossed);
+        let are_told = [sensitive.motion(), gradient.motion()].map(is_told);
+        assert_eq!(are_told, [is_across; 2]);
         assert!((gradient.by("g") - found).abs() <= 1e-13);
         found
     };
-    let cut = by_g(Simulation::new(&VALLEY).at_kinks(true));
-    assert_eq!(by_g(Simulation::new(&VALLEY)), cut);
-    assert!((by_g(Simulation::new(&VALLEY).at_kinks(false)) - cut).abs() > 0.1);
+    let cut = by_g(Simulation::new(&VALLEY).at_kinks(true), false);
+    assert_eq!(by_g(Simulation::new(&VALLEY), false), cut);
+    assert!((by_g(Simulation::new(&VALLEY).at_kinks(false), true) - cut).abs() > 0.1);
 }
 
 /// Two coordinates with a gap, a jump of a force by place and time, and dry friction; velocities depend on both.

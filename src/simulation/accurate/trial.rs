@@ -27,11 +27,6 @@ where
     pub(super) fn has_events(&self) -> bool {
         !self.events.is_empty()
     }
-
-    /// See [`Given::crosses_kinks`].
-    pub(super) fn crosses_kinks(&self) -> bool {
-        self.at_kinks != Some(true) && !M::FACTS.smooth
-    }
 }
 
 /// A run that can be made with other elements and steps, with the motion that it keeps.
