@@ -158,6 +158,28 @@ fn logarithms_beside_fields_as_exponents() {
     assert!(found.value.is_nan() && found.q[0].is_nan() && found.qq[0][0].is_nan());
 }
 
+/// The slope 2 x uᶜ⁻¹ (c ln u + 1) of uᶜ ln u with u = x² + y² is zero at zero where c is more than one half.
+#[test]
+fn logarithms_of_distances_beside_fields_as_exponents() {
+    let text =
+        "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - (x^2 + y^2)^c*ln(x^2 + y^2)";
+    let of = |c: f64, q: [f64; 2]| results_of(text, &[("c", c)], ALL, &q, &[0.0; 2]);
+    for c in [0.75, 1.0, 1.5, 2.0, 3.0] {
+        let found = of(c, [0.0; 2]);
+        assert_eq!((found.value, &found.q[..]), (0.0, &[0.0; 2][..]), "{c}");
+        if c > 1.0 {
+            assert_eq!(found.qq.concat(), [0.0; 4], "{c}");
+        }
+        let u = 25_f64;
+        let slope = 2.0 * u.powf(c - 1.0) * (c * u.ln() + 1.0);
+        let found = of(c, [3.0, 4.0]);
+        close(-found.q[0], 3.0 * slope, "slope by x");
+        close(-found.q[1], 4.0 * slope, "slope by y");
+    }
+    // There the slope is infinite in each direction.
+    assert!(of(0.5, [0.0; 2]).q[0].is_nan());
+}
+
 /// Powers with a field as exponent: derivatives with the factors e, e − 1, … are zero at zero where these are.
 #[test]
 fn fields_as_exponents_at_zero() {

@@ -64,7 +64,8 @@ impl Norm {
             .iter()
             .copied()
             .partition(|factor| self.grows_as_logarithm(graph, *factor));
-        let limit = self.limit_of_powers(graph, (base, powers), &rest);
+        let beside_logarithm = !logarithms.is_empty();
+        let limit = self.limit_of_powers(graph, (base, powers, beside_logarithm), &rest);
         if logarithms.is_empty() {
             let (powers, rest) = limit?;
             return Some(graph.product(Constant::ONE, &[powers, rest].concat()));
@@ -80,9 +81,21 @@ impl Norm {
             size = graph.call(Function::Abs, &[size]);
         }
         let zero = graph.constant(Constant::ZERO);
+        let replaced = powers.iter().find_map(|(x, _)| match graph.node(*x) {
+            Node::Power {
+                base: own,
+                exponent,
+            } if *own != base => Some(*exponent),
+            _ => None,
+        });
         let mut all = [powers, rest].concat();
         for (x, n) in logarithms {
-            let finite = graph.select(Comparison::LessOrEqual, size, zero, zero, x);
+            let mut finite = graph.select(Comparison::LessOrEqual, size, zero, zero, x);
+            if let Some(exponent) = replaced {
+                // A power with one in place of the norm is not zero where the product is.
+                let at_zero = where_root_vanishes(graph, (exponent, true), [zero, x]);
+                finite = graph.select(Comparison::LessOrEqual, base, zero, at_zero, finite);
+            }
             all.push((finite, n));
         }
         Some(graph.product(Constant::ONE, &all))
@@ -108,7 +121,7 @@ impl Norm {
     fn limit_of_powers(
         &self,
         graph: &mut Graph,
-        (base, powers): (ExprId, &[Factor]),
+        (base, powers, beside_logarithm): (ExprId, &[Factor], bool),
         factors: &[Factor],
     ) -> Option<(Vec<Factor>, Vec<Factor>)> {
         let inner = graph.as_multiple(base).1;
@@ -155,7 +168,12 @@ impl Norm {
         let powers = match added.is_zero() && left == 0 && !is_one_power {
             true => powers.to_vec(),
             false => {
-                let raised = self.raised(graph, (base, powers), added, (left, is_single))?;
+                let raised = self.raised(
+                    graph,
+                    (base, powers),
+                    added,
+                    (left, is_single, beside_logarithm),
+                )?;
                 vec![(raised, 1)]
             }
         };
@@ -172,7 +190,7 @@ impl Norm {
         graph: &mut Graph,
         (base, powers): (ExprId, &[Factor]),
         added: Constant,
-        (left, is_single): (i64, bool),
+        (left, is_single, beside_logarithm): (i64, bool, bool),
     ) -> Option<ExprId> {
         let (number, terms) = sum_of_exponents(graph, powers);
         let number = number + added;
@@ -187,25 +205,31 @@ impl Norm {
         }
         let exponent = graph.linear(number, &terms);
         let raised = match number.is_negative() {
-            true => self.one_where_root_vanishes(graph, base, exponent),
+            true => {
+                let [zero, one] = [0, 1].map(|number| graph.integer(number));
+                let at_zero = where_root_vanishes(graph, (exponent, beside_logarithm), [one, zero]);
+                self.elsewhere(graph, base, at_zero)
+            }
             false => base,
         };
         Some(graph.power(raised, exponent))
     }
+}
 
-    /// A square below one of the xᵢ, as x (h²)ᵉ, with one where it is zero, if the product with that is zero with it: where the exponent is −½ or more.
-    fn one_where_root_vanishes(
-        &self,
-        graph: &mut Graph,
-        square: ExprId,
-        exponent: ExprId,
-    ) -> ExprId {
-        let [zero, one, two] = [0, 1, 2].map(|number| graph.integer(number));
-        let half = graph.divide(one, two);
-        let least = graph.negate(half);
-        let at_zero = graph.select(Comparison::LessOrEqual, least, exponent, one, zero);
-        self.elsewhere(graph, square, at_zero)
-    }
+/// The first of two values where x (h²)ᵉ is zero with h, which is where e is −½ or more, and beside a logarithm more than that; else the second.
+fn where_root_vanishes(
+    graph: &mut Graph,
+    (exponent, beside_logarithm): (ExprId, bool),
+    [vanishes, stays]: [ExprId; 2],
+) -> ExprId {
+    let [one, two] = [1, 2].map(|number| graph.integer(number));
+    let half = graph.divide(one, two);
+    let least = graph.negate(half);
+    let comparison = match beside_logarithm {
+        true => Comparison::Less,
+        false => Comparison::LessOrEqual,
+    };
+    graph.select(comparison, least, exponent, vanishes, stays)
 }
 
 /// The number and the other terms of the exponent of a product of powers.
