@@ -14,6 +14,7 @@
 //! | √ | √x^(2n) → xⁿ; √(x²) → abs x; √(x⁴ + x⁶) → x² √(1 + x²); √(1 − cos x) → √(2 sin²(x/2)), and so for 1 + cos x and cosh x − 1 |
 //! | abs, sign | abs(x)^(2n) → x^(2n); abs(x^(2n)) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
 //! | sinh, cosh | sinh x/cosh x → tanh x; a eˣ + a e⁻ˣ → 2 a cosh x; a eˣ − a e⁻ˣ → 2 a sinh x |
+//! | acos | acos(cos x) → sign(sin x)·atan2(sin x, cos x) |
 //! | parity | sin(−x) → −sin x, cos(−x) → cos x, and so for each even or odd function |
 //! | min, max | of x and x → x; hypot(x, 0) → abs x |
 //! | select | with equal branches → the branch; with a decided condition → its branch |
@@ -160,12 +161,30 @@ impl Graph {
             (Function::Abs, Node::Product(factors)) if factors.iter().all(|(_, n)| n % 2 == 0) => {
                 return x;
             }
+            (
+                Function::Acos,
+                Node::Call {
+                    function: Function::Cos,
+                    arguments,
+                },
+            ) => {
+                let arguments = arguments.clone();
+                return self.angle_of_cosine(&arguments, x);
+            }
             _ => {}
         }
         self.intern(Node::Call {
             function,
             arguments: vec![x],
         })
+    }
+
+    /// arccos(cos u) with the digits that cos u has no more near its extrema, and with the slope ±1.
+    fn angle_of_cosine(&mut self, u: &[ExprId], cosine: ExprId) -> ExprId {
+        let sine = self.call(Function::Sin, u);
+        let angle = self.call(Function::Atan2, &[sine, cosine]);
+        let sign = self.call(Function::Sign, &[sine]);
+        self.multiply(sign, angle)
     }
 
     /// `then` where `left comparison right` holds, `otherwise` elsewhere.

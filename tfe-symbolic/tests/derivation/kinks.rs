@@ -51,6 +51,29 @@ fn kinks_that_make_a_smooth_product() {
     }
 }
 
+/// arccos(cos x) = |x| for |x| ≤ π, with all digits where the cosine is rounded to one.
+#[test]
+fn angles_of_cosines() {
+    for x in [0.0, 1e-8, -1e-8, 1e-160, 2.5, -3.0] {
+        check("acos(cos(x))^2", &[], x, &[x * x, 2.0 * x, 2.0]);
+    }
+    check("acos(cos(x))", &[], -1e-8, &[1e-8, -1.0, 0.0]);
+    // Beyond π the angle is 2 π − x.
+    let angle = std::f64::consts::TAU - 4.0;
+    check(
+        "acos(cos(x))^2",
+        &[],
+        4.0,
+        &[angle * angle, -2.0 * angle, 2.0],
+    );
+    check(
+        "acos(cos(c*x))^2/c^2",
+        &[("c", 3.0)],
+        1e-9,
+        &[1e-18, 2e-9, 2.0],
+    );
+}
+
 /// The same beside powers with a field as exponent: |x|ᶜ |sin x| with c = 1, and |x|ᶜ g(x) with c = 2, in which the sign of x is squared.
 #[test]
 fn powers_of_fields_that_make_a_smooth_product() {
