@@ -420,6 +420,25 @@ fn exponentials_of_poles() {
     }
     let e = (-4_f64).exp();
     check("exp(-1/x^2)", &[], 0.5, &[e, 16.0 * e, 160.0 * e]);
+    for energy in [
+        "exp(-1/hypot(x, y))",
+        "exp(-1/(x^2 + y^2))",
+        "exp(-1/norm([x, y]))",
+    ] {
+        let text = format!("coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - {energy}");
+        for q in [[0.0; 2], [3e-9, 4e-9], [3e-160, 4e-160], [1e-300, 0.0]] {
+            let found = results_of(&text, &[], ALL, &q, &[0.0; 2]);
+            assert_eq!(found.q, [0.0; 2], "{energy}");
+            assert_eq!(found.qq.concat(), [0.0; 4], "{energy}");
+        }
+    }
+    // With h = 1/2: slopes E h⁻² x/h, and second derivatives from E (h⁻⁴ − 2 h⁻³) along x and E h⁻³ across.
+    let text = "coordinates(x, y), lagrangian = (dot(x)^2 + dot(y)^2)/2 - exp(-1/hypot(x, y))";
+    let found = results_of(text, &[], ALL, &[0.5, 0.0], &[0.0; 2]);
+    let e = (-2_f64).exp();
+    close(-found.q[0], 4.0 * e, "slope");
+    assert!(found.qq[0][0].abs() <= 1e-14, "along x: {}", found.qq[0][0]);
+    close(-found.qq[1][1], 8.0 * e, "across");
 }
 
 /// Friction −μ tanh(h/ε) v/h with h = |v|, and with other functions: zero at rest, where its slope is −μ/ε in each

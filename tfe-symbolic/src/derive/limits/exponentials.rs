@@ -11,7 +11,7 @@
 //! zero, so is its product with poles. The logarithm of a sum with an exponential, or of a hyperbolic cosine, is as large as its
 //! argument where that overflows.
 
-use super::facts::{argument_of_logarithm, factors_of, is_surely_positive, moves};
+use super::facts::{argument_of_logarithm, factors_of, is_surely_positive, is_zero, moves};
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
 use crate::expr::function::Function;
@@ -49,22 +49,55 @@ const MAX_DEPTH: usize = 4;
 /// A product with zero where an exponential in it is zero, if its exponent has a pole, and another factor has one in the same inputs.
 pub(super) fn where_exponentials_vanish(graph: &mut Graph, x: ExprId) -> ExprId {
     let factors = factors_of(graph, x);
-    let exponential = factors.iter().find(|(exponential, k)| {
-        let Some(exponent) = exponent_of(graph, *exponential).filter(|_| *k > 0) else {
-            return false;
-        };
-        let inputs = graph.inputs_of(exponent);
+    let mut exponentials = factors
+        .iter()
+        .filter(|(_, k)| *k > 0)
+        .filter_map(|(y, _)| Some((*y, exponential_in(graph, *y, MAX_DEPTH)?)));
+    let exponential = exponentials.find(|(own, exponential)| {
+        let inputs = graph.inputs_of(*exponential);
         let diverges = |(y, n): &(ExprId, i32)| {
             let concerns = |y: ExprId| graph.inputs_of(y).iter().any(|leaf| inputs.contains(leaf));
-            y != exponential && has_pole(graph, *y, *n, MAX_DEPTH) && concerns(*y)
+            y != own && has_pole(graph, *y, *n, MAX_DEPTH) && concerns(*y)
         };
-        has_pole(graph, exponent, 1, MAX_DEPTH) && factors.iter().any(diverges)
+        factors.iter().any(diverges)
     });
-    let Some((exponential, _)) = exponential else {
+    let Some((_, exponential)) = exponential else {
         return x;
     };
     let zero = graph.constant(Constant::ZERO);
-    graph.select(Comparison::LessOrEqual, *exponential, zero, zero, x)
+    graph.select(Comparison::LessOrEqual, exponential, zero, zero, x)
+}
+
+/// An exponential whose exponent has a pole, that an expression is a multiple of: as a factor, in all terms of a sum, or as the condition
+/// under which this is zero.
+fn exponential_in(graph: &Graph, x: ExprId, depth: usize) -> Option<ExprId> {
+    let depth = depth.checked_sub(1)?;
+    let x = graph.as_multiple(x).1;
+    match graph.node(x) {
+        Node::Call { .. } => {
+            let exponent = exponent_of(graph, x)?;
+            has_pole(graph, exponent, 1, MAX_DEPTH).then_some(x)
+        }
+        Node::Product(factors) => {
+            let mut above = factors.iter().filter(|(_, n)| *n > 0);
+            above.find_map(|(y, _)| exponential_in(graph, *y, depth))
+        }
+        Node::Sum { constant, terms } if constant.is_zero() => {
+            let mut own = terms.iter().map(|(_, y)| exponential_in(graph, *y, depth));
+            let first = own.next()??;
+            own.all(|other| other == Some(first)).then_some(first)
+        }
+        Node::Select {
+            comparison: Comparison::LessOrEqual,
+            left,
+            right,
+            then,
+            ..
+        } if is_zero(graph, *right) && is_zero(graph, *then) => {
+            exponential_in(graph, *left, depth).filter(|exponential| exponential == left)
+        }
+        _ => None,
+    }
 }
 
 /// u of eᵘ.
