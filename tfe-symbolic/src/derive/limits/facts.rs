@@ -5,6 +5,9 @@ use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::Input;
 
+/// Sums and differences are multiplied out to at most this number of terms.
+pub(super) const MAX_TERMS: usize = 64;
+
 /// The factors of an expression without its number.
 pub(super) fn factors_of(graph: &Graph, x: ExprId) -> Vec<(ExprId, i32)> {
     let x = graph.as_multiple(x).1;
@@ -30,6 +33,16 @@ pub(super) fn times_terms(graph: &mut Graph, x: ExprId, sum: ExprId) -> Vec<(Con
 /// Whether an expression is the number zero.
 pub(super) fn is_zero(graph: &Graph, x: ExprId) -> bool {
     graph.as_constant(x).is_some_and(Constant::is_zero)
+}
+
+/// Whether two expressions are the same when they are multiplied out.
+pub(super) fn is_equal(graph: &mut Graph, x: ExprId, y: ExprId) -> bool {
+    if x == y {
+        return true;
+    }
+    let difference = graph.subtract(x, y);
+    let difference = graph.expanded_within(difference, MAX_TERMS);
+    difference.is_some_and(|difference| is_zero(graph, difference))
 }
 
 /// u of ln u.

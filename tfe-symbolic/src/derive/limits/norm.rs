@@ -7,6 +7,7 @@ use crate::expr::constant::Constant;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::Input;
+use crate::expr::rewrite::Mapping;
 
 /// The depth to which roots, powers and sums are searched.
 pub(super) const MAX_DEPTH: usize = 6;
@@ -63,6 +64,17 @@ fn with_parts_of_norms(graph: &Graph, parts: Vec<Part>, depth: usize) -> Vec<Par
         all.extend(norm.into_iter().flat_map(|norm| norm.parts));
     }
     all
+}
+
+/// The terms of a sum, or the values between which is chosen; none for anything else.
+pub(super) fn terms_or_branches(graph: &Graph, x: ExprId) -> Vec<ExprId> {
+    match graph.node(x) {
+        Node::Sum { terms, .. } => terms.iter().map(|(_, term)| *term).collect(),
+        Node::Select {
+            then, otherwise, ..
+        } => vec![*then, *otherwise],
+        _ => Vec::new(),
+    }
 }
 
 /// Whether f(x)/x is one at x = 0.
@@ -225,6 +237,13 @@ impl Norm {
                     _ => 0.0,
                 }
             }
+            Node::Select {
+                then, otherwise, ..
+            } => {
+                let [then, otherwise] = [*then, *otherwise].map(|y| self.degree(graph, y, depth));
+                then.min(otherwise)
+            }
+            Node::Constant(number) if number.is_zero() => f64::INFINITY,
             _ => 0.0,
         }
     }
@@ -265,7 +284,7 @@ impl Norm {
         degree
     }
 
-    /// Whether a factor is infinite where the norm vanishes: the norm below, its logarithm, or a sum with such a term.
+    /// Whether a factor is infinite where the norm vanishes: the norm below, its logarithm, or a sum or a choice with such a term.
     pub(super) fn diverges(&self, graph: &Graph, (x, n): (ExprId, i32), sums: usize) -> bool {
         if let Some(degree) = self.own_degree(graph, x, MAX_DEPTH) {
             return degree * f64::from(n) < 0.0;
@@ -277,10 +296,12 @@ impl Norm {
             let mut factors = factors_of(graph, argument).into_iter();
             return factors.any(|(y, _)| self.own_degree(graph, y, MAX_DEPTH).is_some());
         }
-        let Some((sums, (_, terms))) = sums.checked_sub(1).zip(graph.as_sum(x)) else {
+        let Some(sums) = sums.checked_sub(1) else {
             return false;
         };
-        let mut factors = terms.iter().flat_map(|(_, term)| factors_of(graph, *term));
+        let mut factors = terms_or_branches(graph, x)
+            .into_iter()
+            .flat_map(|term| factors_of(graph, term));
         factors.any(|factor| self.diverges(graph, factor, sums))
     }
 
@@ -301,20 +322,18 @@ impl Norm {
             let argument = self.or_one(graph, argument);
             return graph.call(Function::Ln, &[argument]);
         }
-        let Some((constant, terms)) = graph.as_sum(x) else {
-            return x;
-        };
-        let terms = terms.to_vec();
-        let mut finite = Vec::with_capacity(terms.len());
-        for (coefficient, term) in terms {
+        let mut mapping = Mapping::default();
+        for term in terms_or_branches(graph, x) {
             let number = graph.as_multiple(term).0;
             let mut factors = factors_of(graph, term);
             for (y, m) in &mut factors {
                 *y = self.made_finite(graph, (*y, *m), sums.saturating_sub(1));
             }
-            finite.push((coefficient, graph.product(number, &factors)));
+            let finite = graph.product(number, &factors);
+            mapping.set(term, finite);
         }
-        graph.linear(constant, &finite)
+        let node = graph.node(x).clone();
+        graph.remake(&node, &mapping)
     }
 
     /// The norm, or a root or power of it, with one in place of the norm where that vanishes. For a negative multiple of a norm that may be negative, minus one.

@@ -12,7 +12,7 @@
 //! x² (ln h − 1).
 
 use super::facts::{argument_of_logarithm, factors_of, moves};
-use super::norm::{MAX_SUMS, Norm};
+use super::norm::{MAX_SUMS, Norm, terms_or_branches};
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::hash::Map;
@@ -76,14 +76,14 @@ impl Norms {
         known.or_insert_with(|| Norm::of(graph, x)).clone()
     }
 
-    /// The norms that may make terms of a sum infinite; none for what is no sum.
+    /// The norms that may make terms of a sum, or branches of a choice, infinite; none for anything else.
     pub(super) fn of_sum(&mut self, graph: &Graph, x: ExprId, sums: usize) -> Vec<Norm> {
         if let Some(known) = self.in_sums.get(&(x, sums)) {
             return known.clone();
         }
-        let terms = graph.as_sum(x).map_or(&[][..], |(_, terms)| terms);
+        let terms = terms_or_branches(graph, x).into_iter();
         let mut found: Vec<Norm> = Vec::new();
-        for factor in terms.iter().flat_map(|(_, term)| factors_of(graph, *term)) {
+        for factor in terms.flat_map(|term| factors_of(graph, term)) {
             for norm in self.of_factor(graph, factor, sums) {
                 if found.len() < MAX_NORMS && !found.iter().any(|known| known.is(&norm)) {
                     found.push(norm);

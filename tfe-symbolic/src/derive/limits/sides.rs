@@ -13,7 +13,7 @@
 //! where the sum is (x − a)².
 
 use super::approach::Approach;
-use super::facts::{factors_of, is_at_rest, is_zero, moves, times_terms};
+use super::facts::{MAX_TERMS, factors_of, is_at_rest, is_equal, moves, times_terms};
 use super::norm::{MAX_DEPTH, MAX_SUMS, is_small_with_its_argument};
 use crate::derive::entry::Entry;
 use crate::expr::comparison::Comparison;
@@ -29,9 +29,6 @@ const MAX_KINKS: usize = 6;
 
 /// Of longer sums only the products of jumps are examined.
 const MAX_JUMPING: usize = 8;
-
-/// Differences of the two sides are multiplied out to at most this number of terms.
-const MAX_TERMS: usize = 64;
 
 /// The list of the placeholder of the quantity that vanishes.
 const KINK: u32 = 1;
@@ -437,12 +434,8 @@ fn limit_from_both_sides(
         Some(graph.linear(Constant::ZERO, &limits))
     };
     let (above, below, at_zero) = (sum(&above)?, sum(&below)?, sum(&at_zero));
-    if above != below {
-        let difference = graph.subtract(above, below);
-        let difference = graph.expanded_within(difference, MAX_TERMS)?;
-        if !is_zero(graph, difference) {
-            return None;
-        }
+    if !is_equal(graph, above, below) {
+        return None;
     }
     if at_zero == Some(above) {
         return None;

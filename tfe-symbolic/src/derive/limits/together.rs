@@ -8,24 +8,22 @@
 //! the c of degree zero add up to the same expression in several directions, that is the limit: here sin²φ/ε + cos²φ/ε. In
 //! other cases the sum is unchanged, as x²/h² is. Directions are rational, so that equal sums are equal expressions.
 
-use super::facts::{factors_of, is_at_rest, is_field};
+use super::facts::{MAX_TERMS, factors_of, is_at_rest, is_equal, is_field, is_zero, times_terms};
 use super::norm::{MAX_DEPTH, MAX_SUMS, Norm, is_small_with_its_argument};
 use super::norms::Norms;
 use super::powers::ROUNDING;
 use crate::expr::comparison::Comparison;
 use crate::expr::constant::Constant;
+use crate::expr::differentiate::derivative;
 use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
-use crate::expr::input::Input;
+use crate::expr::input::{Affine, Input};
 
 /// The depth to which terms are searched.
-const MAX_LEVELS: usize = 8;
-
-/// Sums are multiplied out to at most this number of terms.
-const MAX_TERMS: usize = 64;
+const MAX_LEVELS: usize = 12;
 
 /// Below this norm its third power is subnormal, and a term that is divided by it not a number. The limit has all digits there.
-const TINY: f64 = 1e-100;
+pub(super) const TINY: f64 = 1e-100;
 
 /// Components of directions and their length: axes, and some in between. A norm of fewer parts has those whose further
 /// components are zero.
@@ -44,6 +42,17 @@ const DIRECTIONS: [([i64; 4], i64); 13] = [
     ([1, 1, 1, 1], 2),
     ([1, -1, 1, 1], 2),
 ];
+
+/// The list of the placeholder of the norm along a direction.
+const LENGTH: u32 = 2;
+
+/// The list of the placeholders of its parts.
+const PART: u32 = 3;
+
+/// The placeholder of the norm along a direction.
+fn length() -> Input {
+    Input::Placeholder(LENGTH, Affine::constant(0))
+}
 
 /// What finds limits of sums.
 #[derive(Default)]
@@ -104,25 +113,89 @@ fn has_sign_that_vanishes(graph: &Graph, norm: &Norm, sum: ExprId) -> bool {
     })
 }
 
-/// The limit of a sum where a norm vanishes, if it has one.
-fn limit_of_sum(graph: &mut Graph, norm: &Norm, sum: ExprId) -> Option<ExprId> {
-    let axes = axes(graph, norm.root?)?;
-    let expanded = graph.expanded_within(sum, MAX_TERMS)?;
-    let (number, terms) = graph.terms(expanded);
-    let mut limit: Option<ExprId> = None;
-    for (components, length) in DIRECTIONS {
-        let (own, others) = components.split_at(axes.len());
-        if others.iter().any(|component| *component != 0) {
-            continue;
+/// The limit of an expression where a norm vanishes, if it has one.
+pub(super) fn limit_of_sum(graph: &mut Graph, norm: &Norm, sum: ExprId) -> Option<ExprId> {
+    let polar = Polar::of(graph, norm)?;
+    let sum = polar.enter(graph, sum);
+    let limit = match polar.limit(graph, sum) {
+        Some(limit) => limit,
+        None => {
+            let expanded = graph.expanded_within(sum, MAX_TERMS)?;
+            polar.limit(graph, expanded)?
         }
-        let direction = Direction::of(graph, norm, &axes, (own, length))?;
-        let along = direction.limit(graph, number, &terms)?;
-        if limit.is_some_and(|known| known != along) {
-            return None;
+    };
+    Some(polar.leave(graph, limit))
+}
+
+/// Placeholders for a norm and its parts, so that sums are multiplied out but not parts that are sums themselves.
+struct Polar {
+    axes: Vec<Axis>,
+    /// What is replaced by placeholders.
+    entering: Vec<(ExprId, ExprId)>,
+    leaving: Vec<(ExprId, ExprId)>,
+    /// What changes with the norm.
+    inputs: Vec<Input>,
+}
+
+impl Polar {
+    fn of(graph: &mut Graph, norm: &Norm) -> Option<Self> {
+        let root = norm.root?;
+        let mut axes = axes(graph, root)?;
+        let (mut inputs, leaf) = (vec![length()], graph.input(length()));
+        let mut entering = vec![(root, leaf)];
+        for (at, axis) in axes.iter_mut().enumerate() {
+            let part = Input::Placeholder(PART, Affine::constant(i64::try_from(at).ok()?));
+            let moving = graph.inputs_of(axis.part).into_iter();
+            inputs.extend(moving.filter(|input| !is_at_rest(input)));
+            inputs.push(part.clone());
+            let part = graph.input(part);
+            entering.push((axis.part, part));
+            axis.part = part;
         }
-        limit = Some(along);
+        let leaving = entering.iter().map(|(node, leaf)| (*leaf, *node)).collect();
+        if let Some(square) = norm.square.filter(|_| norm.is_plain) {
+            entering.push((square, graph.multiply(leaf, leaf)));
+        }
+        Some(Self {
+            axes,
+            entering,
+            leaving,
+            inputs,
+        })
     }
-    limit
+
+    fn enter(&self, graph: &mut Graph, x: ExprId) -> ExprId {
+        replaced(graph, x, &self.entering)
+    }
+
+    fn leave(&self, graph: &mut Graph, x: ExprId) -> ExprId {
+        replaced(graph, x, &self.leaving)
+    }
+
+    /// The limit that a sum has in several directions.
+    fn limit(&self, graph: &mut Graph, sum: ExprId) -> Option<ExprId> {
+        let mut limit: Option<ExprId> = None;
+        for (components, length) in DIRECTIONS {
+            let (own, others) = components.split_at(self.axes.len());
+            if others.iter().any(|component| *component != 0) {
+                continue;
+            }
+            let direction = Direction::of(graph, self, (own, length))?;
+            let along = direction.limit(graph, sum)?;
+            if limit.is_some_and(|known| !is_equal(graph, known, along)) {
+                return None;
+            }
+            limit = Some(along);
+        }
+        limit
+    }
+}
+
+/// An expression with nodes replaced by others.
+pub(super) fn replaced(graph: &mut Graph, x: ExprId, nodes: &[(ExprId, ExprId)]) -> ExprId {
+    let new = |old: ExprId| nodes.iter().find(|(node, _)| *node == old);
+    let mapping = graph.with_nodes(x, &mut |_, old, _| new(old).map(|(_, new)| *new));
+    mapping.of(x)
 }
 
 /// A part of a norm, and what it is where the norm is one and the others are zero.
@@ -193,38 +266,41 @@ impl Along {
 
 /// A direction in the space of the parts of a norm.
 struct Direction<'a> {
-    norm: &'a Norm,
     /// The parts, and what they are where the norm is one; `None` for zero.
     parts: Vec<(ExprId, Option<ExprId>)>,
     /// What changes along it.
-    inputs: Vec<Input>,
+    inputs: &'a [Input],
 }
 
 impl<'a> Direction<'a> {
     fn of(
         graph: &mut Graph,
-        norm: &'a Norm,
-        axes: &[Axis],
+        polar: &'a Polar,
         (components, length): (&[i64], i64),
     ) -> Option<Self> {
-        let mut parts = Vec::with_capacity(axes.len());
-        let mut inputs = Vec::new();
-        for (axis, component) in axes.iter().zip(components) {
+        let mut parts = Vec::with_capacity(polar.axes.len());
+        for (axis, component) in polar.axes.iter().zip(components) {
             let share = Constant::rational(i128::from(*component), i128::from(length))?;
             let value = (!share.is_zero()).then(|| graph.scale(share, axis.unit));
             parts.push((axis.part, value));
-            let moving = graph.inputs_of(axis.part).into_iter();
-            inputs.extend(moving.filter(|input| !is_at_rest(input)));
         }
         Some(Self {
-            norm,
             parts,
-            inputs,
+            inputs: &polar.inputs,
         })
     }
 
+    /// The limit of a sum, of its terms or, where these have none, of all together.
+    fn limit(&self, graph: &mut Graph, sum: ExprId) -> Option<ExprId> {
+        let (number, terms) = graph.terms(sum);
+        if let Some(limit) = self.limit_of_terms(graph, number, &terms) {
+            return Some(limit);
+        }
+        self.part_of_degree_zero(graph, sum, MAX_LEVELS)
+    }
+
     /// The sum of the parts of degree zero; `None` if there is a part of lower degree, or one that is not known.
-    fn limit(
+    fn limit_of_terms(
         &self,
         graph: &mut Graph,
         number: Constant,
@@ -232,13 +308,18 @@ impl<'a> Direction<'a> {
     ) -> Option<ExprId> {
         let mut parts = Vec::with_capacity(terms.len());
         for (c, term) in terms {
-            match self.along(graph, *term, MAX_LEVELS)? {
-                Along::Lead(lead) if lead.degree < -ROUNDING => return None,
-                Along::Lead(lead) if lead.degree <= ROUNDING => parts.push((*c, lead.coefficient)),
-                Along::Lead(_) | Along::Zero => {}
-            }
+            parts.push((*c, self.part_of_degree_zero(graph, *term, MAX_LEVELS)?));
         }
         Some(graph.linear(number, &parts))
+    }
+
+    /// The limit of an expression; `None` if its degree is negative, or not known.
+    fn part_of_degree_zero(&self, graph: &mut Graph, x: ExprId, depth: usize) -> Option<ExprId> {
+        match self.along(graph, x, depth)? {
+            Along::Lead(lead) if lead.degree < -ROUNDING => None,
+            Along::Lead(lead) if lead.degree <= ROUNDING => Some(lead.coefficient),
+            Along::Lead(_) | Along::Zero => Some(graph.constant(Constant::ZERO)),
+        }
     }
 
     fn along(&self, graph: &mut Graph, x: ExprId, depth: usize) -> Option<Along> {
@@ -257,11 +338,8 @@ impl<'a> Direction<'a> {
             return Some(value.map_or(Along::Zero, |value| Along::lead(1.0, value)));
         }
         let one = graph.constant(Constant::ONE);
-        if Some(x) == self.norm.root {
+        if matches!(graph.node(x), Node::Input(input) if *input == length()) {
             return Some(Along::lead(1.0, one));
-        }
-        if Some(x) == self.norm.square && self.norm.is_plain {
-            return Some(Along::lead(2.0, one));
         }
         match graph.node(x).clone() {
             Node::Product(factors) => self.along_product(graph, &factors, depth),
@@ -288,29 +366,46 @@ impl<'a> Direction<'a> {
                 then,
                 otherwise,
             } => {
-                let difference = graph.subtract(left, right);
-                let sign = match self.along(graph, difference, depth)? {
-                    Along::Zero => 0.0,
-                    Along::Lead(lead) => match graph.as_constant(lead.coefficient) {
-                        Some(number) if lead.is_exact => number.to_f64(),
-                        _ => return Some(self.as_it_is(graph, x)),
-                    },
-                };
-                let branch = match comparison.holds(sign, 0.0) {
-                    true => then,
-                    false => otherwise,
-                };
-                self.along(graph, branch, depth)
+                let condition = (comparison, left, right);
+                self.along_choice(graph, x, condition, [then, otherwise], depth)
             }
             Node::Call {
                 function,
                 arguments,
             } => match arguments[..] {
                 [argument] => self.along_function(graph, (x, function), argument, depth),
+                [y, z] if matches!(function, Function::Min | Function::Max) => {
+                    let condition = (function.takes_first(), y, z);
+                    self.along_choice(graph, x, condition, [y, z], depth)
+                }
                 _ => Some(self.as_it_is(graph, x)),
             },
             _ => Some(self.as_it_is(graph, x)),
         }
+    }
+
+    /// The branch of a choice that is taken near zero.
+    fn along_choice(
+        &self,
+        graph: &mut Graph,
+        x: ExprId,
+        (comparison, left, right): (Comparison, ExprId, ExprId),
+        [then, otherwise]: [ExprId; 2],
+        depth: usize,
+    ) -> Option<Along> {
+        let difference = graph.subtract(left, right);
+        let sign = match self.along(graph, difference, depth)? {
+            Along::Zero => 0.0,
+            Along::Lead(lead) => match graph.as_constant(lead.coefficient) {
+                Some(number) if lead.is_exact => number.to_f64(),
+                _ => return Some(self.as_it_is(graph, x)),
+            },
+        };
+        let branch = match comparison.holds(sign, 0.0) {
+            true => then,
+            false => otherwise,
+        };
+        self.along(graph, branch, depth)
     }
 
     /// Its own value, which may be zero where the norm is if it changes along the direction.
@@ -385,16 +480,66 @@ impl<'a> Direction<'a> {
             .map(|(c, lead)| (*c, lead.coefficient))
             .collect();
         let coefficient = graph.linear(Constant::ZERO, &lowest);
-        let cancels = graph
-            .as_constant(coefficient)
-            .is_some_and(Constant::is_zero);
-        (!cancels).then(|| {
-            Along::Lead(Lead {
-                degree: least,
-                coefficient,
-                is_exact: leads.iter().all(|(_, lead)| lead.is_exact),
-            })
-        })
+        if is_zero(graph, coefficient) {
+            let sum = graph.linear(constant, terms);
+            return self.along_by_slope(graph, (sum, least), depth);
+        }
+        Some(Along::Lead(Lead {
+            degree: least,
+            coefficient,
+            is_exact: leads.iter().all(|(_, lead)| lead.is_exact),
+        }))
+    }
+
+    /// What a sum is whose terms of lowest degree cancel, from its slope along the direction: 1 − eʰ from −eʰ. Where that degree is negative,
+    /// the sum is multiplied by a power of the norm.
+    fn along_by_slope(
+        &self,
+        graph: &mut Graph,
+        (sum, least): (ExprId, f64),
+        depth: usize,
+    ) -> Option<Along> {
+        let leaf = length();
+        let power = (-least - ROUNDING).ceil().max(0.0);
+        let of_length = self.times_power(graph, sum, power as i32);
+        let mut inputs = graph.inputs_of(of_length).into_iter();
+        if inputs.any(|input| input != leaf && self.inputs.contains(&input)) {
+            return None;
+        }
+        let slope = derivative(graph, of_length, &leaf);
+        if is_zero(graph, slope) {
+            return Some(Along::Zero);
+        }
+        let Along::Lead(lead) = self.along(graph, slope, depth)? else {
+            return Some(Along::Zero);
+        };
+        let degree = lead.degree.round() + 1.0;
+        let is_whole = (lead.degree - lead.degree.round()).abs() <= ROUNDING;
+        if !lead.is_exact || !is_whole || degree < 1.0 {
+            return None;
+        }
+        let times = Constant::integer(degree as i64).reciprocal()?;
+        Some(Along::lead(
+            degree - power,
+            graph.scale(times, lead.coefficient),
+        ))
+    }
+
+    /// A sum as an expression of the norm, times a power of that.
+    fn times_power(&self, graph: &mut Graph, sum: ExprId, power: i32) -> ExprId {
+        let s = graph.input(length());
+        let mut values = Vec::with_capacity(self.parts.len());
+        for (part, value) in &self.parts {
+            let value = match value {
+                Some(value) => graph.multiply(*value, s),
+                None => graph.constant(Constant::ZERO),
+            };
+            values.push((*part, value));
+        }
+        let of_length = replaced(graph, sum, &values);
+        let factor = graph.product(Constant::ONE, &[(s, power)]);
+        let products = times_terms(graph, factor, of_length);
+        graph.linear(Constant::ZERO, &products)
     }
 
     fn along_function(
