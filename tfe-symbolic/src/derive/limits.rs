@@ -19,6 +19,7 @@ mod exponents;
 mod facts;
 mod forms;
 mod inverse;
+mod lengths;
 mod norm;
 mod norms;
 mod powers;
@@ -36,6 +37,7 @@ use exponentials::{logarithm_where_infinite, over_exponentials, where_exponentia
 use exponents::{where_exponents_vanish, with_quotients_merged};
 use facts::{factors_of, is_surely_positive, is_zero, times_terms};
 use inverse::inverse_functions_over_roots;
+use lengths::take_limits_where_lengths_vanish;
 use norms::Norms;
 use sides::take_limits_from_both_sides;
 use together::Together;
@@ -70,6 +72,7 @@ pub(crate) fn take_limits<'a>(
     let (mut norms, mut together) = (Norms::default(), Together::default());
     let mut slopes = derivatives;
     slopes.append(&mut forces);
+    take_limits_where_lengths_vanish(graph, &mut slopes);
     rewrite(graph, &mut slopes, &mut |graph, old, new| {
         if !is_product(graph, old) {
             let new = logarithm_where_infinite(graph, new);

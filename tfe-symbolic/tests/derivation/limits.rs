@@ -425,8 +425,8 @@ fn distances_without_limits_choose_nothing() {
     for parts in [
         "+ k/norm([x, y])",
         "+ k/norm([x, y]) + c*y^2/norm([x, y])^5",
-        "- k/2*(norm([x, y]) - c)^2",
-        "- k/4*(hypot(x, y) - c)^4",
+        "- k/2*(norm([x, y]) - 2)^2",
+        "- k/4*(hypot(x, y) - 2)^4",
         "- k*norm([x, y]) - c*sqrt(1 - x^2 - y^2)",
         "- k*sqrt(x^2 + y^2 + c^2)^3",
         ", force(x) = -k*dot(x)/sqrt(dot(x)^2 + dot(y)^2 + c^2)",

@@ -11,6 +11,7 @@ mod derivatives;
 mod families;
 mod kept_digits;
 mod kinks;
+mod lengths;
 mod limits;
 mod lists;
 mod loops;
