@@ -142,7 +142,7 @@ impl Drop for Bag {
 
 /// The candidate nearest to `name`, if it is near enough to be what was meant.
 ///
-/// Near means: equal but for case, or at most a third of the letters of the longer name (at least
+/// Near means: equal but for case and Greek letters written as words, or at most a third of the letters of the longer name (at least
 /// one) inserted, deleted, replaced or swapped with their neighbour.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let length = name.chars().count();
@@ -151,9 +151,9 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .into_iter()
         .filter(|candidate| *candidate != name)
         .map(|candidate| {
-            let same_but_case = candidate.to_lowercase() == name.to_lowercase();
+            let is_same = spelled(candidate) == spelled(name);
             (
-                if same_but_case {
+                if is_same {
                     0
                 } else {
                     distance(name, candidate)
@@ -168,6 +168,46 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .min()
         .map(|(_, candidate)| candidate.to_owned())
 }
+
+/// A name in lower case, with Greek letters written as words: `theta1` for `θ1` and `Theta1`.
+fn spelled(name: &str) -> String {
+    let letters = name.chars().flat_map(char::to_lowercase);
+    let word = |letter: char| {
+        let (_, word) = GREEK.iter().find(|(greek, _)| greek.contains(letter))?;
+        Some((*word).to_owned())
+    };
+    letters
+        .map(|letter| word(letter).unwrap_or_else(|| letter.to_string()))
+        .collect()
+}
+
+/// The Greek letters with their variants, and their names.
+const GREEK: [(&str, &str); 24] = [
+    ("α", "alpha"),
+    ("β", "beta"),
+    ("γ", "gamma"),
+    ("δ", "delta"),
+    ("εϵ", "epsilon"),
+    ("ζ", "zeta"),
+    ("η", "eta"),
+    ("θϑ", "theta"),
+    ("ι", "iota"),
+    ("κ", "kappa"),
+    ("λ", "lambda"),
+    ("μµ", "mu"),
+    ("ν", "nu"),
+    ("ξ", "xi"),
+    ("ο", "omicron"),
+    ("π", "pi"),
+    ("ρ", "rho"),
+    ("σς", "sigma"),
+    ("τ", "tau"),
+    ("υ", "upsilon"),
+    ("φϕ", "phi"),
+    ("χ", "chi"),
+    ("ψ", "psi"),
+    ("ω", "omega"),
+];
 
 /// Edit distance with swaps of neighbours (optimal string alignment).
 fn distance(a: &str, b: &str) -> usize {

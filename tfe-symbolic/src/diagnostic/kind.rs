@@ -55,6 +55,13 @@ kinds! {
         /// The number without its type.
         number: String,
     },
+    /// `0x1F`
+    NumberInBase {
+        /// The number as written.
+        number: String,
+        /// The same number to the base ten, if it is below 2^64.
+        decimal: Option<u64>,
+    },
     /// `**`
     DoubleStar,
     /// `a..=b`
@@ -283,6 +290,8 @@ kinds! {
     },
     /// A Rayleigh function that does not depend on velocities.
     DissipationWithoutVelocity,
+    /// A Rayleigh function whose derivatives by velocities do not depend on any.
+    LinearDissipation,
     /// `sensitivity()`
     NoSensitivity,
     /// `input()`

@@ -11,6 +11,11 @@ impl Kind {
             Self::MissingComma { .. } => "arguments are separated by commas".into(),
             Self::MissingOperator { left, right } => format!("write `{left}*{right}`"),
             Self::NumberWithType { number } => format!("write `{number}`"),
+            Self::NumberInBase {
+                decimal: Some(number),
+                ..
+            } => format!("write `{number}`"),
+            Self::NumberInBase { decimal: None, .. } => "write it to the base ten".into(),
             Self::DoubleStar => "write `^` for a power".into(),
             Self::InclusiveRange => "write `a..b+1`".into(),
             Self::Condition { .. } => {
@@ -208,6 +213,10 @@ impl Kind {
             Self::ConstantEnergy { .. } => "write the kinetic and potential energies".into(),
             Self::DissipationWithoutVelocity => {
                 "write a Rayleigh function of velocities, such as `c/2*dot(x)^2`".into()
+            }
+            Self::LinearDissipation => {
+                "write a Rayleigh function of velocities, such as `c/2*dot(x)^2`, or a force, such as `force(x) = -c*dot(x)`"
+                    .into()
             }
             Self::NoInput => "name quantities that are given at run time, as in `input(u)`".into(),
             Self::TooManyInputs { .. } => {

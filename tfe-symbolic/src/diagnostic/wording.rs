@@ -13,6 +13,9 @@ impl Kind {
                 format!("missing operator between `{left}` and `{right}`")
             }
             Self::NumberWithType { .. } => "numbers in formulas have no type".into(),
+            Self::NumberInBase { number, .. } => {
+                format!("`{number}` is not a number to the base ten")
+            }
             Self::DoubleStar => "`**` is not an operator".into(),
             Self::InclusiveRange => "`..=` is not supported in sums".into(),
             Self::Condition { word } => format!("`{word}` cannot be used in a formula"),
@@ -134,6 +137,10 @@ impl Kind {
             }
             Self::DissipationWithoutVelocity => {
                 "the dissipation does not depend on any velocity".into()
+            }
+            Self::LinearDissipation => {
+                "the dissipation is linear in velocities: the forces −∂D/∂v do not depend on any"
+                    .into()
             }
             Self::NoInput => "`input` names no input".into(),
             Self::TooManyInputs { limit } => format!("a model can have at most {limit} inputs"),

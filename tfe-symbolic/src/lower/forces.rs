@@ -3,6 +3,7 @@
 use super::{DotRule, Index, Lowerer, SHORT_SUM, Setting, Value};
 use crate::check::Symbol;
 use crate::diagnostic::{Kind, nearest};
+use crate::expr::differentiate::derivative;
 use crate::expr::graph::{ExprId, Node, SumRange};
 use crate::expr::input::{Affine, Input, LoopVariable};
 use crate::expr::sorting::sort;
@@ -219,6 +220,8 @@ impl Lowerer<'_> {
         let inputs = self.graph.inputs_of(dissipation);
         if !inputs.iter().any(velocity) {
             self.report(value.span, Kind::DissipationWithoutVelocity);
+        } else if self.is_linear_in_velocities(dissipation) {
+            self.report(value.span, Kind::LinearDissipation);
         }
         if form == Form::Lagrangian {
             return (Some(dissipation), Vec::new());
@@ -248,5 +251,21 @@ impl Lowerer<'_> {
             value: self.damping(dissipation, at, energy),
         });
         (None, forces.collect())
+    }
+
+    /// Whether the derivatives by velocities do not depend on any; not known where there are loops.
+    fn is_linear_in_velocities(&mut self, value: ExprId) -> bool {
+        if self.graph.contains_sum(value) {
+            return false;
+        }
+        let inputs = self.graph.inputs_of(value).into_iter();
+        let velocities: Vec<Input> = inputs
+            .filter(|input| matches!(input, Input::Velocity(_)))
+            .collect();
+        velocities.iter().all(|velocity| {
+            let slope = derivative(&mut self.graph, value, velocity);
+            let inputs = self.graph.inputs_of(slope);
+            !inputs.iter().any(|input| velocities.contains(input))
+        })
     }
 }

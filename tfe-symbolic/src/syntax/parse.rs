@@ -358,7 +358,7 @@ impl Builder<'_> {
             })
             .map_infix(|left, operator, right| {
                 let (left, right) = (left?, right?);
-                if operator.as_rule() == Rule::missing && is_type(&right) {
+                if operator.as_rule() == Rule::missing && ends_number(&left, &right) {
                     return Some(left);
                 }
                 let operator = match operator.as_rule() {
@@ -407,6 +407,15 @@ impl Builder<'_> {
             } else if window[0].as_rule() == Rule::number && TYPES_OF_NUMBERS.contains(&right) {
                 let number = left.trim_end_matches('_').to_owned();
                 self.bag.push(span, Kind::NumberWithType { number });
+            } else if window[0].as_str() == "0"
+                && span.end - span.start == 1 + right.len()
+                && let Some((radix, digits)) = in_base(right)
+            {
+                let kind = Kind::NumberInBase {
+                    number: format!("0{right}"),
+                    decimal: u64::from_str_radix(&digits, radix).ok(),
+                };
+                self.bag.push(span, kind);
             } else {
                 let (left, right) = (tidy(left), tidy(right));
                 self.bag.push(span, Kind::MissingOperator { left, right });
@@ -490,6 +499,28 @@ const TYPES_OF_NUMBERS: &[&str] = &[
 /// Whether this is the type of a number, which has been reported.
 fn is_type(expr: &Expr) -> bool {
     matches!(&expr.node, ExprKind::Name(name) if TYPES_OF_NUMBERS.contains(&name.as_str()))
+}
+
+/// The base and the digits of what follows the zero of `0x1F`, `0b101` or `0o17`.
+fn in_base(name: &str) -> Option<(u32, String)> {
+    let mut letters = name.chars();
+    let radix = match letters.next()? {
+        'b' => 2,
+        'o' => 8,
+        'x' => 16,
+        _ => return None,
+    };
+    let digits: String = letters.filter(|letter| *letter != '_').collect();
+    let are_digits = !digits.is_empty() && digits.chars().all(|digit| digit.is_digit(radix));
+    are_digits.then_some((radix, digits))
+}
+
+/// Whether this follows a number as its type or as its digits to another base, which has been reported.
+fn ends_number(number: &Expr, follows: &Expr) -> bool {
+    let is_zero = matches!(&number.node, ExprKind::Number(number) if number == "0");
+    let is_beside = number.span.end == follows.span.start;
+    let has_base = |name: &str| is_zero && is_beside && in_base(name).is_some();
+    is_type(follows) || matches!(&follows.node, ExprKind::Name(name) if has_base(name))
 }
 
 /// The inner pairs of a rule, punctuation skipped.
