@@ -15,7 +15,7 @@ use tfe_runtime::constrained::Trail;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, Impulse};
-use tfe_runtime::{CoordinateName, Element, Facts, Form, Statistics, StepError};
+use tfe_runtime::{CoordinateName, Element, Facts, Form, InputFailure, Statistics, StepError};
 
 /// The settings for the solution of elements.
 #[derive(Clone, Copy, Debug)]
@@ -274,8 +274,24 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
     /// Calls `f`, which evaluates the model; `None` if a user function for an input has panicked.
     fn guarded<T>(&self, f: impl FnOnce() -> T) -> Option<T>;
 
-    /// The error of an element that failed; it names a function for an input if that is not finite in the element.
-    fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind;
+    /// The error of an element that failed; it names a function for an input if that is not finite in the element, and
+    /// kinks of forces if steps do not end there, which `at_kinks` tells.
+    fn failed(
+        &self,
+        element: usize,
+        at: (f64, f64),
+        (at_kinks, source): (bool, StepError),
+    ) -> RunErrorKind {
+        let crosses_kinks = !Self::FACTS.smooth && !at_kinks;
+        let source = match crosses_kinks {
+            true => source.across_kinks(),
+            false => source,
+        };
+        RunErrorKind::of_element(self.input_failure(), element, at, source)
+    }
+
+    /// The function for an input that was last found not to be finite.
+    fn input_failure(&self) -> Option<InputFailure>;
 }
 
 /// The second argument of outputs: velocities, or momenta for a Hamiltonian.

@@ -218,12 +218,8 @@ where
     ) -> Result<(), RunErrorKind> {
         let Planned { number, t, h, .. } = *piece;
         M::advance(stepper, (piece.begin, h), state, piece.impulses).map_err(|source| {
-            let crosses_kinks = !M::FACTS.smooth && !self.chosen.at_kinks;
-            let source = match crosses_kinks {
-                true => source.across_kinks(),
-                false => source,
-            };
-            self.model.failed(number, (t, h), source)
+            let why = (self.chosen.at_kinks, source);
+            self.model.failed(number, (t, h), why)
         })
     }
 

@@ -126,6 +126,11 @@ where
         self.stepper = None;
     }
 
+    /// The settings of the steps of the run.
+    pub(super) fn chosen(&self) -> &Chosen {
+        &self.again.chosen
+    }
+
     /// Compares the element if it is due. Linear models are skipped: the error of their elements is known.
     #[inline(always)]
     pub(super) fn look(&mut self, statistics: &Statistics, examined: Examined<'_, N, L>) {

@@ -264,7 +264,8 @@ where
             Some(Ok(node)) => node,
             Some(Err(source)) => {
                 model.look(&mut self.watch, element.number, at, &before, true);
-                return Some(Err(model.failed(element.number, at, source)));
+                let why = (self.resolution.chosen().at_kinks, source);
+                return Some(Err(model.failed(element.number, at, why)));
             }
             None => return Some(Err(RunErrorKind::panicked(t))),
         };

@@ -117,6 +117,10 @@ fn steps_across_a_jump_that_holds_the_motion_are_told_so() {
         "{error}"
     );
     assert!(error.to_string().contains("at_kinks(true)"), "{error}");
+    let kind = run
+        .steps(held.state([1.0], [1.0]), 0.0)
+        .find_map(Result::err);
+    assert_eq!(kind.as_ref(), Some(error.kind()));
 }
 
 /// If friction sticks, the motion stays at v = 0, and the equations as declared do not define it.

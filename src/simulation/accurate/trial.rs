@@ -211,7 +211,8 @@ where
     }
 
     fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
-        self.run.model.failed(element, at, source)
+        let why = (self.run.chosen().at_kinks, source);
+        self.run.model.failed(element, at, why)
     }
 }
 

@@ -19,8 +19,8 @@ use tfe_runtime::dual::{Dual, duals};
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::{Control, DenseElement, Impulse, Stepper, Suspended};
 use tfe_runtime::{
-    CoordinateName, Element, Facts, First, Model, ModelError, Second, Share, State, Statistics,
-    StepError,
+    CoordinateName, Element, Facts, First, InputFailure, Model, ModelError, Second, Share, State,
+    Statistics, StepError,
 };
 
 /// Creates a stepper; it cuts steps at kinks if asked to.
@@ -343,7 +343,7 @@ impl<M: Model<N>, const N: usize> Simulated<N, FixedLength> for M {
         Model::guarded(self, f).ok()
     }
 
-    fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
-        RunErrorKind::of_element(self.failed_input(), element, at, source)
+    fn input_failure(&self) -> Option<InputFailure> {
+        self.failed_input()
     }
 }

@@ -16,7 +16,7 @@ use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::step::{Control, Impulse};
-use tfe_runtime::{CoordinateName, Element, Facts, Share, Statistics, StepError};
+use tfe_runtime::{CoordinateName, Element, Facts, InputFailure, Share, Statistics, StepError};
 
 impl<M: family::Model> Simulated<0, RunTimeLength> for M {
     const FACTS: Facts = M::FACTS;
@@ -319,8 +319,8 @@ impl<M: family::Model> Simulated<0, RunTimeLength> for M {
         family::Model::guarded(self, f).ok()
     }
 
-    fn failed(&self, element: usize, at: (f64, f64), source: StepError) -> RunErrorKind {
-        RunErrorKind::of_element(self.failed_input(), element, at, source)
+    fn input_failure(&self) -> Option<InputFailure> {
+        self.failed_input()
     }
 }
 
