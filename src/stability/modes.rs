@@ -77,6 +77,9 @@ pub struct Mode {
     kind: ModeKind,
 }
 
+/// The largest number of frequencies that are made for one mode.
+const MOST_FREQUENCIES: usize = 10_000_000;
+
 impl Mode {
     /// The eigenvalue λ; of a pair, the one with positive imaginary part.
     pub fn multiplier(&self) -> Complex<f64> {
@@ -106,7 +109,7 @@ impl Mode {
     }
 
     /// The `count` lowest of the frequencies |ω + 2πk/h|, k = 0, −1, 1, −2, …, that have this multiplier; ascending,
-    /// each once.
+    /// each once. No more than ten million are made.
     pub fn frequencies(&self, count: usize) -> Vec<f64> {
         let angle = self.multiplier.arg().abs();
         let step = self.step.abs();
@@ -120,7 +123,7 @@ impl Mode {
             };
             angle / step
         };
-        (0..count).map(nth).collect()
+        (0..count.min(MOST_FREQUENCIES)).map(nth).collect()
     }
 
     /// The damping ratio ζ = −σ/√(σ² + ω²), with the principal frequency: 1 for a mode that decays without
@@ -267,6 +270,8 @@ mod tests {
         }
         assert!(mode.frequency() <= PI);
         assert!(mode.frequencies(0).is_empty());
+        // There was not the memory for all of them.
+        assert_eq!(mode.frequencies(usize::MAX).len(), MOST_FREQUENCIES);
         let all = modes(&diagonal(&[1.0, -1.0]), 0.5).unwrap();
         assert_eq!(all[0].frequencies(3), [0.0, 2.0 * TAU, 4.0 * TAU]);
         assert_eq!(all[1].frequencies(2), [TAU, 3.0 * TAU]);
