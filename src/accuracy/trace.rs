@@ -12,6 +12,16 @@ pub(crate) struct Trace {
     acts: Vec<usize>,
     /// The largest finite magnitude of each kind so far, also between the rows.
     sizes: Vec<f64>,
+    lost: Option<Lost>,
+}
+
+/// An output that is not finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Lost {
+    /// The index of the output.
+    pub(crate) output: usize,
+    /// The index of the first row in which it is not finite.
+    pub(crate) row: usize,
 }
 
 impl Trace {
@@ -25,7 +35,13 @@ impl Trace {
             kinds,
             rows: Vec::new(),
             acts: Vec::new(),
+            lost: None,
         }
+    }
+
+    /// The first output that is not finite in a row.
+    pub(crate) fn lost(&self) -> Option<Lost> {
+        self.lost
     }
 
     /// Takes the numbers at one time; they become a row if `keeps`.
@@ -34,6 +50,14 @@ impl Trace {
             *size = largest(*size, &row[kind.clone()]);
         }
         if keeps {
+            let outputs = self.kinds.iter().skip(2).map(|kind| row[kind.start]);
+            let lost = outputs.map(f64::is_finite).position(|is_finite| !is_finite);
+            let number = self.acts.len();
+            let here = lost.map(|output| Lost {
+                output,
+                row: number,
+            });
+            self.lost = self.lost.or(here);
             self.rows.extend_from_slice(row);
             self.acts.push(acts);
         }
@@ -163,6 +187,13 @@ mod tests {
         let mut sizes = Vec::new();
         a.sizes_with(&[1.0, f64::NEG_INFINITY, 3.0], &mut sizes);
         assert_eq!(sizes, [1.0, 1.0, 3.0]);
+    }
+
+    #[test]
+    fn outputs_that_are_not_finite_are_told() {
+        let nan = f64::NAN;
+        let trace = trace(&[[1.0, 1.0, 1.0], [1.0, nan, 1.0], [1.0, 1.0, nan]]);
+        assert_eq!(trace.lost(), Some(Lost { output: 0, row: 2 }));
     }
 
     #[test]

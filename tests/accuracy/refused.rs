@@ -211,3 +211,57 @@ fn the_longest_step_is_checked() {
         assert!(matches!(error.kind(), RunErrorKind::Step { .. }), "{error}");
     }
 }
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2 - x^2/2,
+    force(x) = -c*dot(x),
+    output(height) = 1 - x^2,
+    output(depth) = sqrt(x - level),
+)]
+struct Damped {
+    c: f64,
+    level: f64,
+}
+
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - 9.81*y,
+    constraint(rod) = x^2 + y^2 - 1,
+    output(depth) = ln(y - level),
+)]
+struct Hanging {
+    level: f64,
+}
+
+/// An output that has no value is told with its time; it was "the step is …, but it must be finite and not zero".
+#[test]
+fn outputs_without_a_value_are_told() {
+    let lost = |kind: &RunErrorKind| match kind {
+        RunErrorKind::OutputNotFinite { output, time } => (output.clone(), *time),
+        kind => panic!("{kind}"),
+    };
+    // x = cos t for c = 0: it falls below the level 1/2 at π/3.
+    for c in [0.0, 0.1] {
+        for level in [2.0, 0.5] {
+            let model = Damped { c, level };
+            let run = Simulation::new(&model).accuracy(1e-6);
+            let error = run.run(model.state([1.0], [0.0]), 0.0..3.0);
+            let (output, time) = lost(error.expect_err("there is no root").kind());
+            assert_eq!(output, "depth");
+            let first = if level > 1.0 { 0.0 } else { 1.0 };
+            assert!(time > first && time <= first + 1.0, "{c} {level}: {time}");
+        }
+    }
+    let model = Hanging { level: 0.0 };
+    let run = Simulation::new(&model).accuracy(1e-6);
+    let error = run.run(model.state([0.0, -1.0], [1.0, 0.0]), 0.0..3.0);
+    let error = error.expect_err("there is no logarithm");
+    assert_eq!(lost(error.kind()).0, "depth");
+    assert!(
+        error
+            .to_string()
+            .contains("output `depth` is not finite at t = "),
+        "{error}"
+    );
+}

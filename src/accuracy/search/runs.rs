@@ -2,7 +2,7 @@
 
 use super::super::estimated::{Attempt, Picked};
 use super::super::grading::Grading;
-use super::super::trace::Trace;
+use super::super::trace::{Lost, Trace};
 use crate::error::RunErrorKind;
 use crate::numbers::larger;
 use std::ops::{ControlFlow, Range};
@@ -13,6 +13,8 @@ use tfe_runtime::{Element, Solve, StepError};
 pub(crate) struct Asked {
     pub(crate) accuracy: f64,
     pub(crate) span: Range<f64>,
+    /// The names of the outputs.
+    pub(crate) outputs: Vec<String>,
     /// Times at which elements must end.
     pub(crate) breaks: Vec<f64>,
     /// The element, if it was chosen by the caller.
@@ -246,6 +248,8 @@ pub(super) struct Noting<'r> {
     runner: &'r mut dyn Runner,
     /// The first failure, or the first because the motion slides.
     failure: Option<RunErrorKind>,
+    /// The output that was not finite in the last run, and the time.
+    lost: Option<(Lost, f64)>,
 }
 
 impl<'r> Noting<'r> {
@@ -253,6 +257,29 @@ impl<'r> Noting<'r> {
         Self {
             runner,
             failure: None,
+            lost: None,
+        }
+    }
+
+    /// The result of a search. If no step is short enough, and an output of the last run is not finite, that is why.
+    pub(super) fn concluded(
+        self,
+        found: Result<Found, RunErrorKind>,
+        outputs: &[String],
+    ) -> Result<Found, RunErrorKind> {
+        let is_short_enough = match &found {
+            Ok(found) => found.is_met || found.picked.error_estimate.is_finite(),
+            Err(RunErrorKind::Step { .. } | RunErrorKind::TooManySteps { .. }) => false,
+            Err(_) => true,
+        };
+        match self.lost {
+            Some((Lost { output, .. }, time)) if !is_short_enough => {
+                Err(RunErrorKind::OutputNotFinite {
+                    output: outputs.get(output).cloned().unwrap_or_default(),
+                    time,
+                })
+            }
+            _ => found.map_err(|error| self.explained(error)),
         }
     }
 
@@ -266,7 +293,7 @@ impl<'r> Noting<'r> {
     /// The error of a search. Where steps below a rounding of the span would be needed, these are no steps of the
     /// motion: the state does not change in them, as where friction holds a body at rest. Why longer steps fail tells
     /// more.
-    pub(super) fn explained(self, error: RunErrorKind) -> RunErrorKind {
+    fn explained(self, error: RunErrorKind) -> RunErrorKind {
         match (error, self.failure) {
             (RunErrorKind::TooManySteps { span, step }, Some(failure))
                 if step.abs() < f64::EPSILON * span.abs() =>
@@ -281,6 +308,13 @@ impl<'r> Noting<'r> {
 impl Runner for Noting<'_> {
     fn run(&mut self, settings: &RunSettings<'_>) -> Result<Ran, Failed> {
         let ran = self.runner.run(settings);
+        if let Ok(ran) = &ran {
+            let time = |lost: Lost| settings.cuts.get(1 + lost.row).copied();
+            self.lost = ran
+                .trace
+                .lost()
+                .map(|lost| (lost, time(lost).unwrap_or(f64::NAN)));
+        }
         ran.inspect_err(|failed| self.note(failed))
     }
 
@@ -291,6 +325,11 @@ impl Runner for Noting<'_> {
         observer: &mut PairObserver<'_>,
     ) -> Result<PairRun, Failed> {
         let ran = self.runner.run_pair(settings, better, observer);
+        if let Ok(ran) = &ran {
+            let lost = ran.traces.iter().find_map(Trace::lost);
+            let time = |lost: Lost| ran.times.get(lost.row).copied();
+            self.lost = lost.map(|lost| (lost, time(lost).unwrap_or(f64::NAN)));
+        }
         ran.inspect_err(|failed| self.note(failed))
     }
 }

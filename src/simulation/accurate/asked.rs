@@ -178,6 +178,7 @@ where
             return Err(run.refused(kind, at_start));
         }
         let asked = Asked {
+            outputs: shown(&run.model.output_names()),
             accuracy: self.accuracy,
             span: span.clone(),
             // An impulse inside an element reduces the order, so elements end there.
