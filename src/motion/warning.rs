@@ -91,6 +91,17 @@ pub enum Warning {
         /// The number of such elements that were found.
         count: usize,
     },
+    /// The function of an [event](crate::Simulation::on) is not a number (NaN), as the square root or the logarithm of
+    /// a negative number: it has no sign there, so that the event cannot happen.
+    ///
+    /// Checked in every element that no event cuts. A single point without a number, and one at which the function is
+    /// infinite, are no reason for a warning.
+    EventUndefined {
+        /// The event.
+        event: String,
+        /// The first time at which the function was found not to be a number.
+        time: f64,
+    },
 }
 
 impl fmt::Display for Warning {
@@ -171,6 +182,11 @@ impl fmt::Display for Warning {
                 }
                 f.write_str("; take a shorter step or an element with more nodes")
             }
+            Self::EventUndefined { event, time } => write!(
+                f,
+                "the function of the event `{event}` is not a number (NaN) at t = {}, so that the event cannot happen there: look for a root or a logarithm of a negative number, or for a parameter that is not a number",
+                Short(*time)
+            ),
         }
     }
 }

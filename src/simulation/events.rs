@@ -66,6 +66,8 @@ pub(super) struct Events<'m, const N: usize, L: Length<N> = FixedLength> {
     since: f64,
     /// The length of the current step.
     step: f64,
+    /// The times from which on functions were found to be NaN.
+    undefined: Vec<Option<f64>>,
 }
 
 impl<const N: usize, L: Length<N>> fmt::Debug for Events<'_, N, L> {
@@ -280,14 +282,15 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
         };
         let mut course = |function, part| self.course(run, dense, function, part);
         let roundings = self.roundings(model, (t, arc.before));
-        let (found, ends) = search::crossings(
+        let found = search::crossings(
             (&self.seen.sides, &roundings),
             samples,
             resolution / h.abs(),
             &value,
             &mut course,
         );
-        let mut remaining = Remaining::new(found, ends);
+        let undefined = found.undefined;
+        let mut remaining = Remaining::new(found.roots, found.sides);
         let mut is_begun: Vec<bool> = self.seen.sides.iter().map(|side| *side != 0.0).collect();
         if self.has_impacts() {
             let mut rows = [Vec::new(), Vec::new()];
@@ -333,6 +336,7 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             }
         }
         self.seen.sides = remaining.into_sides();
+        self.note_undefined(&undefined, |tau| t + tau * h);
         Ok(None)
     }
 

@@ -109,9 +109,15 @@ where
         }
     }
 
-    pub(super) fn into_motion(self, stepper: &L::Stepper<'m, M>, last: &L::State) -> Motion<N, L> {
-        let warning = self.resolution.warning(last);
-        self.record.into_motion(warning, *M::statistics(stepper))
+    /// The motion, with these warnings and its own.
+    pub(super) fn into_motion(
+        self,
+        stepper: &L::Stepper<'m, M>,
+        last: &L::State,
+        warnings: impl Iterator<Item = Warning>,
+    ) -> Motion<N, L> {
+        let warnings = self.resolution.warning(last).into_iter().chain(warnings);
+        self.record.into_motion(warnings, *M::statistics(stepper))
     }
 }
 
@@ -157,8 +163,12 @@ impl<const N: usize, L: Length<N>> Record<N, L> {
     }
 
     /// The motion with all warnings and the work of its steps.
-    fn into_motion(mut self, warning: Option<Warning>, statistics: Statistics) -> Motion<N, L> {
-        self.watch.add(warning);
+    fn into_motion(
+        mut self,
+        warnings: impl Iterator<Item = Warning>,
+        statistics: Statistics,
+    ) -> Motion<N, L> {
+        self.watch.add(warnings);
         self.motion.set_statistics(statistics);
         self.motion.set_warnings(self.watch.into_warnings());
         self.motion

@@ -182,7 +182,7 @@ where
             }
             bar.advance();
         }
-        let mut motion = recorder.into_motion(stepper, &state);
+        let mut motion = recorder.into_motion(stepper, &state, pieces.events.warnings());
         if let Err(kind) = pieces.restore(stepper, &self.model) {
             failure.get_or_insert(kind);
         }

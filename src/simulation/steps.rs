@@ -187,6 +187,9 @@ where
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = self.watch.warnings().to_vec();
         warnings.extend(self.resolution.warning(&self.endless.state));
+        if let Some(pieces) = &self.endless.pieces {
+            warnings.extend(pieces.events.warnings());
+        }
         warnings
     }
 

@@ -166,9 +166,9 @@ impl Watch {
         }
     }
 
-    /// Adds a warning, if there is one.
-    pub(super) fn add(&mut self, warning: Option<Warning>) {
-        self.warnings.extend(warning);
+    /// Adds warnings, or one if there is one.
+    pub(super) fn add(&mut self, warnings: impl IntoIterator<Item = Warning>) {
+        self.warnings.extend(warnings);
     }
 
     pub(super) fn warnings(&self) -> &[Warning] {

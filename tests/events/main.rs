@@ -14,6 +14,7 @@ mod parts;
 #[path = "../../examples/events_beside_scans.rs"]
 mod scans;
 mod setting;
+mod undefined;
 
 use differences::difference_over;
 use nalgebra::DMatrix;

@@ -27,6 +27,17 @@ impl Root {
     }
 }
 
+/// What a search along an element has found.
+#[derive(Debug, PartialEq)]
+pub(super) struct Crossings {
+    /// In the order of time.
+    pub(super) roots: Vec<Root>,
+    /// The signs of the functions at the end; zero if unknown.
+    pub(super) sides: Vec<f64>,
+    /// The positions from which on functions are NaN up to the end.
+    pub(super) undefined: Vec<Option<f64>>,
+}
+
 /// If the sign at the start is unknown, the function is also sampled close to the start, at 4⁻¹, 4⁻², … of the first
 /// sample.
 const CLOSER: i32 = 12;
@@ -85,8 +96,7 @@ fn places(samples: usize, proof: &mut dyn FnMut((f64, f64)) -> ZeroProof) -> Vec
     ends
 }
 
-/// The zero crossings of the functions `values` (τ), and the signs of the functions at the end. `sides` are the signs
-/// at the start; zero if unknown: then values up to `roundings` have no sign. Signs are compared at the ends of parts in which `course` proves at most one
+/// The zero crossings of the functions `values` (τ). `sides` are the signs at the start; zero if unknown: then values up to `roundings` have no sign. Signs are compared at the ends of parts in which `course` proves at most one
 /// crossing; without bounds, of about `samples` equal parts. A pair of crossings between samples is also found at the
 /// vertex of a parabola where a function comes close to zero. A crossing at the boundary of two parts belongs to the
 /// later one.
@@ -96,13 +106,13 @@ pub(super) fn crossings(
     resolution: f64,
     values: &dyn Fn(f64, &mut Vec<f64>),
     proof: &mut dyn FnMut(usize, (f64, f64)) -> ZeroProof,
-) -> (Vec<Root>, Vec<f64>) {
+) -> Crossings {
     let row = |tau: &f64| {
         let mut row = Vec::with_capacity(sides.len());
         values(*tau, &mut row);
         row
     };
-    let (mut roots, mut ends) = (Vec::new(), Vec::new());
+    let (mut roots, mut ends, mut undefined) = (Vec::new(), Vec::new(), Vec::new());
     for (function, side) in sides.iter().enumerate() {
         let mut times = vec![0.0];
         if *side == 0.0 {
@@ -114,6 +124,7 @@ pub(super) fn crossings(
         times.dedup();
         let mut value = |tau: f64| row(&tau)[function];
         let column: Vec<f64> = times.iter().map(|tau| value(*tau)).collect();
+        undefined.push(undefined_from(&times, &column));
         let mut side = *side;
         let mut from = 0.0;
         let mut change = |from: f64, to: f64, side: &mut f64| {
@@ -165,7 +176,18 @@ pub(super) fn crossings(
         ends.push(side);
     }
     roots.sort_by(|a, b| a.tau.total_cmp(&b.tau));
-    (roots, ends)
+    Crossings {
+        roots,
+        sides: ends,
+        undefined,
+    }
+}
+
+/// The time from which on all samples are NaN, if these are two at least: a single one may be a singular point.
+fn undefined_from(times: &[f64], column: &[f64]) -> Option<f64> {
+    let defined = column.iter().rposition(|value| !value.is_nan());
+    let first = defined.map_or(0, |last| last + 1);
+    (first + 1 < column.len()).then(|| times[first])
 }
 
 /// The minimum of the distance from zero on a parabola through three values of the same sign: about the middle one; if
@@ -197,10 +219,10 @@ mod tests {
 
     fn taus(side: f64, f: impl Fn(f64) -> f64) -> Vec<f64> {
         let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
-        let (roots, _) = crossings((&[side], &[0.0]), 8, 1e-15, &values, &mut |_, _| {
+        let found = crossings((&[side], &[0.0]), 8, 1e-15, &values, &mut |_, _| {
             ZeroProof::Unbounded
         });
-        roots.iter().map(|root| root.tau).collect()
+        found.roots.iter().map(|root| root.tau).collect()
     }
 
     fn is_near(found: &[f64], expected: &[f64]) -> bool {
@@ -248,8 +270,9 @@ mod tests {
             let mut proof = |_, _: (f64, f64)| ZeroProof::Unbounded;
             crossings((&[0.0], &[rounding]), 8, 1e-15, &values, &mut proof)
         };
-        assert_eq!(found(0.0).0.len(), 1);
-        assert_eq!(found(1e-15), (Vec::new(), vec![-1.0]));
+        assert_eq!(found(0.0).roots.len(), 1);
+        let Crossings { roots, sides, .. } = found(1e-15);
+        assert_eq!((roots, sides), (Vec::new(), vec![-1.0]));
     }
 
     /// A pair of roots that sampling would miss, with bounds of the derivative 2 (τ − 0.3).
@@ -268,7 +291,8 @@ mod tests {
                 ZeroProof::Unproved
             }
         };
-        let (roots, sides) = crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut proof);
+        let Crossings { roots, sides, .. } =
+            crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut proof);
         let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
         assert!(is_near(&found, &[0.3, near]), "{found:?}");
         assert_eq!((sides, questions), (vec![1.0], 39));
@@ -289,7 +313,8 @@ mod tests {
                     ZeroProof::Unproved
                 }
             };
-            let (roots, sides) = crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut proof);
+            let Crossings { roots, sides, .. } =
+                crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut proof);
             let found: Vec<f64> = roots.iter().map(|root| root.tau).collect();
             assert!(is_near(&found, &expected), "{found:?}");
             assert_eq!(sides, vec![1.0]);
@@ -326,5 +351,23 @@ mod tests {
     fn what_has_no_sign_has_no_root() {
         assert_eq!(taus(0.0, |_| 0.0), [0.0; 0]);
         assert_eq!(taus(0.0, |_| f64::NAN), [0.0; 0]);
+    }
+
+    /// A function that is NaN at the end of an element, and in part of it, is told; a single NaN is not.
+    #[test]
+    fn functions_that_are_no_number_are_told() {
+        let from = |f: fn(f64) -> f64| {
+            let values = |tau: f64, row: &mut Vec<f64>| row.push(f(tau));
+            let mut proof = |_, _: (f64, f64)| ZeroProof::Unbounded;
+            crossings((&[1.0], &[0.0]), 8, 1e-15, &values, &mut proof).undefined[0]
+        };
+        assert_eq!(from(|_| f64::NAN), Some(0.0));
+        let root = from(|tau| (0.55 - tau).sqrt() + 1.0);
+        assert!(
+            root.is_some_and(|tau| (0.55..0.7).contains(&tau)),
+            "{root:?}"
+        );
+        assert_eq!(from(|tau| if tau == 1.0 { f64::NAN } else { 1.0 }), None);
+        assert_eq!(from(|tau| if tau < 0.6 { f64::NAN } else { 1.0 }), None);
     }
 }

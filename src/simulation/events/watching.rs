@@ -7,7 +7,7 @@ use super::value::{Function, Value};
 use super::{Buffers, Events, Watched};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
-use crate::motion::Seen;
+use crate::motion::{Seen, Warning};
 use crate::simulation::kind::Simulated;
 use crate::simulation::pieces::{Pieces, Search};
 use std::collections::VecDeque;
@@ -171,6 +171,7 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
     ) -> Result<Self, RunErrorKind> {
         let watched = watched(on, names)?;
         Ok(Self {
+            undefined: vec![None; watched.len()],
             needs_velocity: needs_velocity || watched.iter().any(Watched::is_function),
             seen: unseen(&watched),
             due: VecDeque::new(),
@@ -182,6 +183,23 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             cuts: 0,
             since: 0.0,
             step: 0.0,
+        })
+    }
+
+    /// Remembers which functions are NaN from a position of an element on, whose time is `at`; beyond a cut they may be
+    /// so without harm.
+    pub(super) fn note_undefined(&mut self, undefined: &[Option<f64>], at: impl Fn(f64) -> f64) {
+        for (known, tau) in self.undefined.iter_mut().zip(undefined) {
+            *known = known.or(tau.map(&at));
+        }
+    }
+
+    /// Warnings of events that could not happen, because their functions were NaN.
+    pub(in crate::simulation) fn warnings(&self) -> impl Iterator<Item = Warning> {
+        let watched = self.watched.iter().zip(&self.undefined);
+        watched.filter_map(|(watched, time)| {
+            let event = watched.on.name.clone();
+            time.map(|time| Warning::EventUndefined { event, time })
         })
     }
 }
