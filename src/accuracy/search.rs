@@ -16,8 +16,8 @@ use cuts::{again, cuts};
 use ladder::{Ladder, Verdict};
 use probe::probe;
 use runs::{
-    AIM, COARSER, Climbed, FIRST, LEFT, LONGER, MAX_FACTOR, MAX_RUNS, MAX_STEPS, MIN_FACTOR,
-    Noting, TIGHTEST, largest,
+    AIM, COARSER, Climbed, FIRST, MIN_FACTOR, LEFT, LONGER, MAX_FACTOR, MAX_FAILURES,
+    MAX_RUNS, MAX_STEPS, Noting, TIGHTEST, largest,
 };
 pub(crate) use runs::{
     Asked, Failed, Found, Graded, PairComparison, PairObserver, PairRun, Pilot, Ran, RunSettings,
@@ -227,17 +227,14 @@ fn climb(
     most_steps: f64,
 ) -> Result<Climbed, RunErrorKind> {
     let cuts = cuts(asked, settings.grading, step);
-    let mut settings = RunSettings {
-        cuts: &cuts,
-        ..settings
-    };
+    let mut settings = RunSettings { cuts: &cuts, ..settings };
     let element = settings.element;
     let (length, longest) = settings.lengths(asked);
     settings.tolerance = asked.tolerance(length / step);
     settings.step = (COARSER * step).min(longest).min(settings.step);
     let mut ladder = Ladder::new(element, asked.accuracy, settings.grading.is_some());
-    let mut failure = None;
-    while ladder.attempts.len() < MAX_RUNS {
+    let (mut failures, mut failure) = (0, None);
+    while ladder.attempts.len() < MAX_RUNS + failures && failures < MAX_FAILURES {
         if length / settings.step > most_steps {
             let (attempts, step) = (ladder.attempts, settings.step);
             return Ok(Climbed::TooMany { attempts, step });
@@ -276,7 +273,7 @@ fn climb(
             Err(failed) if failed.is_final_after(failure.as_ref()) => return Err(failed.kind),
             Err(failed) => {
                 ladder.fail(taken);
-                failure = Some(failed.kind);
+                (failures, failure) = (failures + 1, Some(failed.kind));
                 settings.step *= 0.6;
             }
         }

@@ -460,3 +460,26 @@ fn breaks_a_rounding_apart_are_one() {
     let at_end = run.accuracy(1e-6);
     at_end.run(start, 0.0..late).expect("a break");
 }
+
+/// Orbits that pass the centre closely, from the apocentre over two periods: the first runs of the search all fail at
+/// the first pericentre, and longer steps across it lead to different motions, but the motion does not end there.
+#[test]
+fn close_encounters_are_no_end_of_a_motion() {
+    for (eccentricity, accuracy) in [(0.98, 1e-3), (0.98, 1e-8), (0.99, 1e-6)] {
+        let apart = 1.0 + eccentricity;
+        let start = State {
+            q: [-apart, 0.0],
+            p: [0.0, -((1.0 - eccentricity) / apart).sqrt()],
+        };
+        let run = Simulation::new(&Kepler).accuracy(accuracy);
+        let motion = run.run(start, 0.0..4.0 * std::f64::consts::PI);
+        let motion = motion.unwrap_or_else(|error| panic!("e = {eccentricity}: {error}"));
+        let q = motion.last().q;
+        let off = (q[0] - start.q[0]).hypot(q[1]) / apart;
+        assert!(
+            off <= accuracy,
+            "e = {eccentricity}: {off:e} of {accuracy:e}"
+        );
+        assert!(motion.error_estimate() <= accuracy);
+    }
+}

@@ -177,6 +177,8 @@ pub(super) const RESOLVED: f64 = 0.1;
 pub(super) const MAX_UNRESOLVED: u32 = 5;
 /// The largest number of runs over the whole span.
 pub(super) const MAX_RUNS: usize = 14;
+/// The largest number of runs that fail. Steps have become 200 000 times shorter by then.
+pub(super) const MAX_FAILURES: usize = 24;
 /// The largest number of steps of a run. The nodes of more would take gigabytes, and a search that asks for them has
 /// errors that do not decrease with the order of its element.
 pub(super) const MAX_STEPS: f64 = 1e7;

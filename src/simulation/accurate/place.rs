@@ -50,7 +50,9 @@ impl Place {
 /// Whether the motion continues beyond the time at which a run failed, when steps are halved as often as needed.
 ///
 /// It does not if it ends in a singularity. With `compares`, it does not either if steps get across a singularity only
-/// by chance: two runs with different step sizes then reach different states.
+/// by chance: a step and two of half its length then end in different states however short they are, and so do two runs
+/// with different step sizes. Steps across a regular but fast part of the motion, such as a close encounter, agree when
+/// they are short enough.
 fn is_passed(
     run: &dyn Repeatable,
     settings: &RunSettings<'_>,
@@ -63,34 +65,39 @@ fn is_passed(
         return true;
     };
     let given = run.given();
-    let Ok(mut stepper) = run.stepper(settings.element, trusting(given.control), false) else {
+    let Ok(stepper) = run.stepper(settings.element, trusting(given.control), false) else {
         return true;
+    };
+    let mut passage = Passage {
+        stepper,
+        mesh,
+        seen: compares.then(|| Trace::new(given.coordinates, 0)),
     };
     let mut trace = given.trace();
     let mut rows = [vec![0.0; trace.width()], vec![0.0; trace.width()]];
     let [row, _] = &mut rows;
-    stepper.place(time, state);
-    stepper.row(row);
+    passage.stepper.place(time, state);
+    passage.stepper.row(row);
     trace.pass(row, 0, false);
     for (row, first) in rows.iter_mut().zip([step, OTHER * step]) {
-        match beyond(&mut *stepper, mesh, (time, step, first), state) {
-            Beyond::Reached => stepper.row(row),
+        match passage.beyond((time, step, first), state) {
+            Beyond::Reached => passage.stepper.row(row),
             Beyond::Stopped => return false,
             Beyond::Unknown => return true,
         }
     }
-    !compares || agree(&trace, &rows)
-}
-
-/// Whether two runs have reached the same state, as rows of numbers.
-fn agree(trace: &Trace, [one, other]: &[Vec<f64>; 2]) -> bool {
     /// The largest difference, relative to the largest number of the same kind, of two runs that agree.
     const SAME: f64 = 0.1;
+    !compares || agree(&trace, &rows, SAME)
+}
+
+/// Whether two rows of numbers differ by at most `most`, relative to the largest number of the same kind.
+fn agree(trace: &Trace, [one, other]: &[Vec<f64>; 2], most: f64) -> bool {
     let (mut differences, mut sizes) = (Vec::new(), Vec::new());
     trace.differences(one, other, &mut differences);
     trace.sizes_with(one, &mut sizes);
     let mut kinds = differences.iter().zip(&sizes);
-    kinds.all(|(differences, size)| *differences <= SAME * size)
+    kinds.all(|(differences, size)| *differences <= most * size)
 }
 
 /// The outcome of trial steps beyond a time at which a run has failed.
@@ -102,40 +109,71 @@ enum Beyond {
     Unknown,
 }
 
-/// Makes steps from `time` on, the first of length `first`, each shortened as often as it fails.
-fn beyond(
-    stepper: &mut dyn Stepping,
-    mesh: &Times,
-    (time, step, first): (f64, f64, f64),
-    state: &[f64],
-) -> Beyond {
-    /// The length of the trial, in steps of the failed run.
-    const FAR: f64 = 4.0;
-    const MAX: u32 = 2000;
-    /// A remainder shorter than this relative amount of a step is rounding error, and gets no step of its own.
-    const ROUNDINGS: f64 = 1.0 - 1e-9;
-    let end = time + FAR * step;
-    let (mut t, mut h, mut state) = (time, first, state.to_vec());
-    for _ in 0..MAX {
-        let is_last = h.abs() >= ROUNDINGS * (end - t).abs();
-        let next = if is_last { end } else { t + h };
-        if next == t {
-            return Beyond::Stopped;
-        }
-        stepper.place(t, &state);
-        match stepper.advance(mesh, (t, next, next - t)) {
-            Ok(()) if is_last => return Beyond::Reached,
-            Ok(()) => {
-                (t, state) = (next, stepper.state());
-                h = if first.abs() > 2.0 * h.abs() {
-                    2.0 * h
-                } else {
-                    first
-                };
+/// Steps beyond a time at which a run has failed.
+struct Passage<'a> {
+    stepper: Box<dyn Stepping + 'a>,
+    mesh: &'a Times,
+    /// The states so far, if every step is compared with two of half its length.
+    seen: Option<Trace>,
+}
+
+impl Passage<'_> {
+    /// Makes steps from `time` on, the first of length `first`, each shortened as often as it fails.
+    fn beyond(&mut self, (time, step, first): (f64, f64, f64), state: &[f64]) -> Beyond {
+        /// The length of the trial, in steps of the failed run.
+        const FAR: f64 = 4.0;
+        const MAX: u32 = 2000;
+        /// A remainder shorter than this relative amount of a step is rounding error, and gets no step of its own.
+        const ROUNDINGS: f64 = 1.0 - 1e-9;
+        let end = time + FAR * step;
+        let (mut t, mut h, mut state) = (time, first, state.to_vec());
+        for _ in 0..MAX {
+            let is_last = h.abs() >= ROUNDINGS * (end - t).abs();
+            let next = if is_last { end } else { t + h };
+            if next == t {
+                return Beyond::Stopped;
             }
-            Err(_) if is_last => h = (next - t) / 2.0,
-            Err(_) => h /= 2.0,
+            match self.step(t, next, &state) {
+                Some(_) if is_last => return Beyond::Reached,
+                Some(reached) => {
+                    (t, state) = (next, reached);
+                    h = if first.abs() > 2.0 * h.abs() {
+                        2.0 * h
+                    } else {
+                        first
+                    };
+                }
+                None if is_last => h = (next - t) / 2.0,
+                None => h /= 2.0,
+            }
         }
+        Beyond::Unknown
     }
-    Beyond::Unknown
+
+    /// The state that a step reaches. `None` if it fails, or if two steps of half its length end elsewhere and these
+    /// are to be compared.
+    fn step(&mut self, t: f64, next: f64, state: &[f64]) -> Option<Vec<f64>> {
+        /// The largest relative difference between a step and two of half its length that agree.
+        const SAME: f64 = 1e-6;
+        let whole = self.end_of(&[t, next], state)?;
+        let Some(mut seen) = self.seen.take() else {
+            return Some(whole);
+        };
+        seen.pass(state, 0, false);
+        let halves = self.end_of(&[t, t + (next - t) / 2.0, next], state);
+        let reached = halves.filter(|halves| agree(&seen, &[whole, halves.clone()], SAME));
+        self.seen = Some(seen);
+        reached
+    }
+
+    /// The state at the last of the times, by one step from each to the next; `None` if one fails.
+    fn end_of(&mut self, times: &[f64], state: &[f64]) -> Option<Vec<f64>> {
+        self.stepper.place(times[0], state);
+        for ends in times.windows(2) {
+            let (from, to) = (ends[0], ends[1]);
+            let element = (from, to, to - from);
+            self.stepper.advance(self.mesh, element).ok()?;
+        }
+        Some(self.stepper.state())
+    }
 }
