@@ -78,8 +78,8 @@ pub enum Warning {
     /// length (nine of a ninth if the element had been cut), and the two results differ, at its end or, continued, at
     /// the end of the next element (`docs/theory.md`, (T-121)).
     ///
-    /// Checked in elements whose iteration did not contract quickly, the 0th, 1st, 2nd, 4th, 8th, … of these; not in
-    /// linear models, nor with [`Solve::Trusting`](crate::Solve::Trusting).
+    /// Checked in elements whose iteration did not contract quickly or that made none, as linear models do with constant
+    /// coefficients: the 0th, 1st, 2nd, 4th, 8th, … of these. Not with [`Solve::Trusting`](crate::Solve::Trusting).
     Unresolved {
         /// The time at the start of the first such element.
         time: f64,

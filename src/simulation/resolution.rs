@@ -131,10 +131,10 @@ where
         &self.again.chosen
     }
 
-    /// Compares the element if it is due. Linear models are skipped: the error of their elements is known.
+    /// Compares the element if it is due.
     #[inline(always)]
     pub(super) fn look(&mut self, statistics: &Statistics, examined: Examined<'_, N, L>) {
-        if const { M::FACTS.linear } || self.again.chosen.control.solve == Solve::Trusting {
+        if self.again.chosen.control.solve == Solve::Trusting {
             return;
         }
         // Parts of such an element have lost digits of their length, or are of length zero.

@@ -11,6 +11,7 @@ mod critical_speed;
 mod derivative;
 #[path = "../common/differences.rs"]
 mod differences;
+mod resolution;
 mod stiff;
 mod top;
 mod warnings;

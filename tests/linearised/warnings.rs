@@ -13,14 +13,20 @@ struct Oscillator {
 
 const UNIT: Oscillator = Oscillator { k: 1.0, c: 0.0 };
 
-/// The warnings of a run of a hundred steps from x = 1.
+/// The warnings about stability: that long steps do not resolve the motion, stable or not, is another one.
+fn of_stability(warnings: &[Warning]) -> Vec<Warning> {
+    let is_unstable = |one: &&Warning| matches!(one, Warning::UnstableStep { .. });
+    warnings.iter().filter(is_unstable).cloned().collect()
+}
+
+/// The warnings about stability of a run of a hundred steps from x = 1.
 fn warnings(model: &Oscillator, element: impl Into<Element>, h: f64) -> Vec<Warning> {
     let motion = Simulation::new(model)
         .element(element)
         .step(h)
         .run(model.state([1.0], [0.0]), 0.0..100.0 * h)
         .expect("a linear model");
-    motion.warnings().to_vec()
+    of_stability(motion.warnings())
 }
 
 #[test]
@@ -97,7 +103,7 @@ fn backwards_in_time_too() {
             .step(h)
             .run(model.state([1.0], [0.0]), 0.0..-20.0 * h)
             .expect("a linear model");
-        motion.warnings().to_vec()
+        of_stability(motion.warnings())
     };
     let found = run(&UNIT, 3.3);
     let [Warning::UnstableStep { step, radius, .. }] = found[..] else {
