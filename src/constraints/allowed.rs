@@ -62,7 +62,11 @@ impl ConstrainedMotions {
         let [across, along] = split(n, &rows);
         let by_rows = |of: &[DVector<f64>]| DMatrix::from_fn(of.len(), n, |i, j| of[i][j]);
         let needed = by_rows(&rates) * &coordinates;
-        let least = (by_rows(&rows) * &across).lu().solve(&needed);
+        // Without rows there is no equation; a factorisation takes no matrix of size zero.
+        let least = match rows.is_empty() {
+            true => Some(needed.clone()),
+            false => (by_rows(&rows) * &across).lu().solve(&needed),
+        };
         // With dependent rows the result would not be finite.
         let least = least.unwrap_or_else(|| needed.map(|_| f64::NAN));
         let velocities = across * -least;

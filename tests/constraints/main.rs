@@ -19,6 +19,7 @@ mod overconstrained;
 mod reactions;
 mod redundant;
 mod reference_values;
+mod released;
 mod runs;
 mod singular;
 mod small_steps;
