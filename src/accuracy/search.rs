@@ -16,8 +16,8 @@ use cuts::{again, cuts};
 use ladder::{Ladder, Verdict};
 use probe::probe;
 use runs::{
-    AIM, COARSER, Climbed, FIRST, MIN_FACTOR, LEFT, LONGER, MAX_FACTOR, MAX_FAILURES,
-    MAX_RUNS, MAX_STEPS, Noting, TIGHTEST, largest,
+    AIM, COARSER, Climbed, FIRST, LEFT, LONGER, MAX_FACTOR, MAX_FAILURES, MAX_RUNS, MAX_STEPS,
+    MIN_FACTOR, Noting, TIGHTEST, largest,
 };
 pub(crate) use runs::{
     Asked, Failed, Found, Graded, PairComparison, PairObserver, PairRun, Pilot, Ran, RunSettings,
@@ -227,7 +227,10 @@ fn climb(
     most_steps: f64,
 ) -> Result<Climbed, RunErrorKind> {
     let cuts = cuts(asked, settings.grading, step);
-    let mut settings = RunSettings { cuts: &cuts, ..settings };
+    let mut settings = RunSettings {
+        cuts: &cuts,
+        ..settings
+    };
     let element = settings.element;
     let (length, longest) = settings.lengths(asked);
     settings.tolerance = asked.tolerance(length / step);

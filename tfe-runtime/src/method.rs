@@ -98,6 +98,7 @@ pub struct Memory<const N: usize> {
 pub(crate) struct Last<const N: usize> {
     pub(crate) t: f64,
     pub(crate) h: f64,
+    /// The start and its rounding error, which emitted solvers do not keep.
     pub(crate) start: State<N>,
     pub(crate) start_low: State<N>,
     pub(crate) end: State<N>,

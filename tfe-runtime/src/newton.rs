@@ -13,20 +13,27 @@ pub use crate::control::{Control, Solve};
 
 /// The settings of an iteration, known at run time or at compile time.
 pub(crate) trait Asked {
+    /// Whether the start of the last step is kept, as dense output and derivatives of steps need it.
+    const KEEPS_START: bool;
+
     fn control(&self) -> Control;
 }
 
 impl Asked for Control {
+    const KEEPS_START: bool = true;
+
     #[inline(always)]
     fn control(&self) -> Control {
         *self
     }
 }
 
-/// [`Control::default`] as compile-time constants.
+/// [`Control::default`] as compile-time constants, for emitted solvers.
 pub(crate) struct Standard;
 
 impl Asked for Standard {
+    const KEEPS_START: bool = false;
+
     #[inline(always)]
     fn control(&self) -> Control {
         Control::DEFAULT
@@ -97,6 +104,7 @@ const SMALL: usize = 8;
 const LARGE: usize = 24;
 
 /// Monitors the convergence of a sequence of increments.
+#[derive(Clone, Copy)]
 pub(crate) struct Monitor {
     tolerance: f64,
     /// The weight of the previous rate.

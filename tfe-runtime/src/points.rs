@@ -31,6 +31,7 @@ pub(crate) mod inertia;
 #[cfg(feature = "alloc")]
 pub(crate) mod reach;
 pub(crate) mod second_order;
+mod size;
 mod step;
 pub(crate) mod sweep;
 pub(crate) mod tables;
@@ -394,29 +395,6 @@ where
         }
     }
     (force, rate)
-}
-
-/// What sizes are at least, so that changes of zero are zero relative to them.
-const MIN_SIZE: f64 = f64::MIN_POSITIVE;
-
-/// The largest magnitude, or [`MIN_SIZE`].
-#[inline(always)]
-fn largest<const N: usize>(numbers: &[f64; N]) -> f64 {
-    let mut largest = MIN_SIZE;
-    for a in 0..N {
-        let size = numbers[a].abs();
-        largest = if largest < size { size } else { largest };
-    }
-    largest
-}
-
-fn is_finite<const N: usize>(state: &State<N>) -> bool {
-    let mut zero = 0.0;
-    for a in 0..N {
-        // Zero times a number that is not finite is NaN.
-        zero += 0.0 * state.q[a] + 0.0 * state.p[a];
-    }
-    zero == 0.0
 }
 
 #[cfg(all(test, feature = "simd", target_arch = "x86_64"))]

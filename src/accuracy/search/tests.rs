@@ -171,9 +171,8 @@ fn pairs_know_what_cannot_be_had() {
     .expect("runs");
     assert!(!refused.is_met && refused.picked.error_estimate >= 1e-12);
     assert!(refused.picked.attempts.len() < 10);
-    let by_tolerance = |settings: &RunSettings<'_>, step: f64| {
-        1e4 * settings.tolerance * noise(settings, step)
-    };
+    let by_tolerance =
+        |settings: &RunSettings<'_>, step: f64| 1e4 * settings.tolerance * noise(settings, step);
     let (found, error) = found_in(true, 1e-6, false, by_tolerance).expect("runs");
     assert!(found.is_met && error.abs() <= 1e-6, "{error}");
     let outcome = found_in(true, 1e-6, false, |_, _| f64::NAN);

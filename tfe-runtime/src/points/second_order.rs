@@ -6,7 +6,7 @@ use super::evaluation::Evaluation;
 use super::forms::acting;
 use crate::model::{Form, Model};
 use crate::precise::Precise;
-use crate::registers::side::Side;
+use crate::registers::side::{Side, each_coordinate};
 
 /// The unknowns and the working memory of their iteration; rows for each point or each group of points.
 pub(crate) struct Forces<'a, X, const L: usize, const N: usize> {
@@ -35,12 +35,12 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         let reach = A::entries(&at.tables().reach);
         for (drift, reach) in self.drift.iter_mut().zip(reach) {
             let reach = h * A::entry(like, *reach);
-            for a in 0..N {
+            each_coordinate!(a, N, {
                 if M::IGNORABLE[a] {
                     continue;
                 }
                 drift[a] = (reach * at.number(like, self.velocity[a])).lanes();
-            }
+            });
         }
     }
 
@@ -72,12 +72,14 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
         let products_low = &self.more_products[..count];
         let reach = &A::entries(&tables.reach)[..count];
         let reach_low = &A::entries(&tables.reach_low)[..count];
-        for c in 0..count {
-            let (reach, reach_low) = (A::entry(like, reach[c]), A::entry(like, reach_low[c]));
-            for a in 0..N {
-                if M::IGNORABLE[a] {
-                    continue;
-                }
+        each_coordinate!(a, N, {
+            if M::IGNORABLE[a] {
+                continue;
+            }
+            let v = at.number(like, self.velocity[a]);
+            let v_low = at.number(like, self.velocity_low[a]);
+            let start_low = at.low(like, a).0;
+            for c in 0..count {
                 let low = if is_diagonal {
                     let by_square = like.like(inertia.reach_low[a]) * like.with(products[c][a]);
                     let more = like.with(products_low[c][a]);
@@ -87,13 +89,12 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                     let rate = inertia.row::<M, _, L>(like, &products[c], a);
                     square.times_plus(rate_low, square_low * rate)
                 };
-                let v = at.number(like, self.velocity[a]);
-                let v_low = at.number(like, self.velocity_low[a]);
+                let (reach, reach_low) = (A::entry(like, reach[c]), A::entry(like, reach_low[c]));
                 let v_low = reach.times_plus(v_low, reach_low * v);
-                let low = at.low(like, a).0 + h.times_plus(v_low, low);
+                let low = start_low + h.times_plus(v_low, low);
                 drift[c][a] = h.times_plus(reach * v, low).lanes();
             }
-        }
+        });
     }
 
     /// One iteration: coordinates from products with the forces, then forces at the coordinates. Returns how much
@@ -135,7 +136,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                 positions::<V, A, M, false, L, N>(like, at, far, q);
             }
             if const { M::FACTS.forced } {
-                for a in 0..N {
+                each_coordinate!(a, N, {
                     z[a] = match M::FORM {
                         Form::Lagrangian => {
                             let rate = inertia.row::<M, _, L>(like, &more_products[c], a);
@@ -146,10 +147,10 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                             h.times_plus(rate, at.start(like, a).1)
                         }
                     };
-                }
+                });
             }
             A::first(model, at.time(like, nodes[c]), (q, z), first, None);
-            for a in 0..N {
+            each_coordinate!(a, N, {
                 if M::IGNORABLE[a] {
                     continue;
                 }
@@ -166,7 +167,7 @@ impl<X: Copy, const L: usize, const N: usize> Forces<'_, X, L, N> {
                 changed.raise(factor * (force - like.with(forces[c][a])));
                 size.raise(factor * force);
                 at.set(&mut forces[c][a], force);
-            }
+            });
         }
         (changed, size)
     }
@@ -185,7 +186,7 @@ fn positions<V, A, M, const DIAGONAL: bool, const L: usize, const N: usize>(
     M: Model<N>,
 {
     let (inertia, square) = (at.inertia(), like.like(at.h() * at.h()));
-    for a in 0..N {
+    each_coordinate!(a, N, {
         if M::IGNORABLE[a] {
             continue;
         }
@@ -197,7 +198,7 @@ fn positions<V, A, M, const DIAGONAL: bool, const L: usize, const N: usize>(
             square.times_plus(inertia.row::<M, _, L>(like, products, a), drift)
         };
         q[a] = at.start(like, a).0 + moved;
-    }
+    });
 }
 
 /// The velocity that belongs to a momentum, and its rounding error: no floating-point velocity belongs exactly to the

@@ -2,8 +2,8 @@
 
 use super::evaluation::{Evaluation, FEW, Placed};
 use super::forms::{acting, is_phase, is_second_order};
-use super::{StepInput, Outcome, Points, Together, Work};
-use super::{is_finite, largest};
+use super::size::{is_finite, largest};
+use super::{Outcome, Points, StepInput, Together, Work};
 use crate::error::StepError;
 use crate::method::{Last, Memory};
 use crate::model::{Model, State};
@@ -64,7 +64,7 @@ where
             return isa.vectorize(InRegisters { job: self, isa });
         }
         let (of, memory) = ((self.model, self.asked), self.memory);
-        step_out_of_line(self.points, of, self.tables, memory, self.place, self.state)
+        step_apart(self.points, of, self.tables, memory, self.place, self.state)
     }
 
     /// The whole step.
@@ -125,8 +125,10 @@ where
         (points.is_warm, points.last_step) = (true, h);
         // In place: with many coordinates, copies take time.
         let last = memory.last.get_or_insert(Last::NONE);
-        (last.t, last.h) = (t, h);
-        (last.start, last.start_low, last.end) = (*state, memory.low, end);
+        (last.t, last.h, last.end) = (t, h, end);
+        if const { A::KEEPS_START } {
+            (last.start, last.start_low) = (*state, memory.low);
+        }
         (*state, memory.low) = (end, end_low);
         memory.preference.confirm_fixed_point();
         memory.statistics.steps += 1;
@@ -138,7 +140,7 @@ where
 /// A step without wide registers. Not inlined, because it has several callers; its arguments are passed one by one, so
 /// that they need not be in memory.
 #[inline(never)]
-fn step_out_of_line<M, T, A, S: Storage, const N: usize>(
+fn step_apart<M, T, A, S: Storage, const N: usize>(
     points: &mut Points<N, S>,
     (model, asked): (&M, &A),
     tables: &T,
@@ -225,12 +227,12 @@ where
             },
             force_factors: [1.0; N],
         };
-        work.distance = largest(&input.start.q);
+        work.distance = largest(like, &input.start.q);
         if const { is_second_order::<M, N>() } {
             work.begin_second_order::<_, M>(like, &input);
-            work.speed = largest(&work.velocity);
+            work.speed = largest(like, &work.velocity);
         } else {
-            work.speed = largest(&input.start.p);
+            work.speed = largest(like, &input.start.p);
         }
         let is_rough = control.is_rough();
         let mut monitor = Monitor::of_fixed_point(control.tolerance);
@@ -321,7 +323,7 @@ where
             } else {
                 work.finish::<V, true>(like, &input, place);
             }
-            if is_finite(&end.0) {
+            if is_finite(like, &end.0) {
                 // Until here the old forces are kept, because a failed step would have to start from them.
                 points.forces.take(&mut work.forces);
                 points.rates.take(&mut work.rates);
@@ -332,7 +334,11 @@ where
         } else {
             failure = Some(match evidence {
                 Err(unproven) if converged => unproven,
-                _ => monitor.stalled(iterations, &control),
+                _ => {
+                    // A copy, so that the monitor itself may stay in registers.
+                    let last = monitor;
+                    last.stalled(iterations, &control)
+                }
             });
         }
         Outcome {

@@ -1,6 +1,7 @@
 //! Products of the tables of an element with values at its points.
 
 use super::four::Four;
+use super::side::each_coordinate;
 use super::storage::{MAX_GROUPS, Matrix, Row, Storage, Weights};
 use crate::precise::{Precise, add_exactly, exact_term};
 
@@ -94,7 +95,7 @@ impl<S: Storage> Matrix<S> {
         // Two sums, of even and of odd columns: with few coordinates, the latency of successive additions dominates.
         if let ([whole], []) = (whole.as_chunks::<C>().0, rest) {
             // The compiler unrolls loops over groups without gaps.
-            for a in 0..N {
+            each_coordinate!(a, N, {
                 if !wanted[a] {
                     continue;
                 }
@@ -106,10 +107,10 @@ impl<S: Storage> Matrix<S> {
                 for c in 0..C {
                     products[c][a] = (sums[0][c] + sums[1][c]).lanes();
                 }
-            }
+            });
             return;
         }
-        for a in 0..N {
+        each_coordinate!(a, N, {
             if !wanted[a] {
                 continue;
             }
@@ -141,7 +142,7 @@ impl<S: Storage> Matrix<S> {
                 let is_one = const { C == 1 } && whole.is_empty();
                 products[c][a] = if is_one { even[c] } else { even[c] + odd[c] }.lanes();
             }
-        }
+        });
     }
 
     /// The columns one after the other, in groups of four rows.
@@ -350,10 +351,10 @@ mod tests {
     fn products_by_constant_sizes_are_those_of_any_size() {
         for points in 1..=16_usize {
             match points.div_ceil(4) {
-                1 => (compared::<1, 1>(points), compared::<3, 1>(points)),
-                2 => (compared::<1, 2>(points), compared::<3, 2>(points)),
-                3 => (compared::<1, 3>(points), compared::<3, 3>(points)),
-                _ => (compared::<1, 4>(points), compared::<3, 4>(points)),
+                1 => (compared::<1, 1>(points), compared::<6, 1>(points)),
+                2 => (compared::<1, 2>(points), compared::<6, 2>(points)),
+                3 => (compared::<1, 3>(points), compared::<6, 3>(points)),
+                _ => (compared::<1, 4>(points), compared::<6, 4>(points)),
             };
         }
     }

@@ -11,6 +11,21 @@ pub trait Side<const LANES: usize>: Precise {
     fn lanes(self) -> [f64; LANES];
 }
 
+/// Runs a block for every coordinate, four in each turn of a loop: with many coordinates, a tenth of the instructions of
+/// a step would count them one by one.
+macro_rules! each_coordinate {
+    ($a:ident, $count:ident, $body:block) => {
+        for block in 0..$count / 4 {
+            for lane in 0..4 {
+                let $a = 4 * block + lane;
+                $body
+            }
+        }
+        for $a in $count / 4 * 4..$count $body
+    };
+}
+pub(crate) use each_coordinate;
+
 /// Loads a row from memory into registers.
 #[cfg(feature = "alloc")]
 #[inline(always)]
