@@ -366,7 +366,9 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     ///
     /// Inside an element the impulse is weighted by the test functions (T-49); at a node it changes the momentum there,
     /// and the recorded node at that instant shows the momentum before the impulse. In a run backwards in time the
-    /// impulse is subtracted, as the effect of any force is.
+    /// impulse is subtracted, as the effect of any force is. An impulse outside the span of a run is an error,
+    /// [`RunErrorKind::Impulse`](crate::RunErrorKind::Impulse), and not left out as a [break](Self::break_at) is; those
+    /// before the checkpoint of a run that is [resumed](Self::resume) have acted.
     ///
     /// ```
     /// use tfe::prelude::*;
