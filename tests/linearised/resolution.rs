@@ -1,6 +1,7 @@
 //! Steps of linear models that do not resolve the motion have a warning, as those of other models. No iteration fails
 //! there, whatever the step: the equations of an element are linear.
 
+use crate::largest::larger;
 use tfe::prelude::*;
 use tfe::{Motion, Warning};
 
@@ -44,15 +45,10 @@ fn is_told(warnings: &[Warning]) -> bool {
 fn off(motion: &Motion<1>, exact: impl Fn(f64) -> f64, extent: f64) -> f64 {
     let nodes = motion.states().iter();
     let distances = nodes.map(|node| (node.q[0] - exact(node.t)).abs() / extent);
-    distances.fold(
-        0.0,
-        |most, distance| {
-            if most >= distance { most } else { distance }
-        },
-    )
+    distances.fold(0.0, larger)
 }
 
-/// Two steps of each length: an error of a fifth of the extent is told, and one of a hundredth is not.
+/// Two steps of each length: an error of a fifth of the extent is told, and one of a thousandth is not.
 #[test]
 fn long_steps_of_linear_models_are_told() {
     let free = |t: f64| t.cos();

@@ -61,6 +61,8 @@ fn is_passed(
     compares: bool,
 ) -> bool {
     const OTHER: f64 = 0.618;
+    /// The largest difference, relative to the largest number of the same kind, of two runs that agree.
+    const SAME: f64 = 0.1;
     let &RunErrorKind::Solve { time, step, .. } = kind else {
         return true;
     };
@@ -86,8 +88,6 @@ fn is_passed(
             Beyond::Unknown => return true,
         }
     }
-    /// The largest difference, relative to the largest number of the same kind, of two runs that agree.
-    const SAME: f64 = 0.1;
     !compares || agree(&trace, &rows, SAME)
 }
 
