@@ -12,7 +12,7 @@
 //! | quotients | x/y → x·y⁻¹; x/x → 1; xᵉ/xⁿ → xᵉ⁻ⁿ for a number e; xᵉ⁻¹·x → xᵉ |
 //! | powers | x^n a product for whole n; x^(n/2) → √xⁿ |
 //! | √ | √x^(2n) → xⁿ; √(x²) → abs x; √(x⁴ + x⁶) → x² √(1 + x²); √(1 − cos x) → √(2 sin²(x/2)), and so for 1 + cos x and cosh x − 1 |
-//! | abs, sign | abs(x)^(2n) → x^(2n); abs(x^(2n)) → x^(2n); abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
+//! | abs, sign | abs(x)^(2n) → x^(2n); abs(x^(2n)) → x^(2n); abs(x² + y²) → x² + y²; abs(abs x) → abs x; abs(√x) → √x; of c x with c > 0 → c abs x, sign x; x·sign x → abs x; abs(x)·sign x → x; abs(x)ᵉ·sign²x → abs(x)ᵉ |
 //! | sinh, cosh | sinh x/cosh x → tanh x; a eˣ + a e⁻ˣ → 2 a cosh x; a eˣ − a e⁻ˣ → 2 a sinh x |
 //! | acos | acos(cos x) → sign(sin x)·atan2(sin x, cos x) |
 //! | parity | sin(−x) → −sin x, cos(−x) → cos x, and so for each even or odd function |
@@ -160,6 +160,12 @@ impl Graph {
             ) => return x,
             (Function::Abs, Node::Product(factors)) if factors.iter().all(|(_, n)| n % 2 == 0) => {
                 return x;
+            }
+            (Function::Abs, Node::Sum { constant, terms }) if !constant.is_negative() => {
+                let is_square = |y: ExprId| matches!(self.node(y), Node::Product(factors) if factors.iter().all(|(_, n)| n % 2 == 0));
+                if terms.iter().all(|(c, y)| !c.is_negative() && is_square(*y)) {
+                    return x;
+                }
             }
             (
                 Function::Acos,

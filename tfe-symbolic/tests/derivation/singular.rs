@@ -494,6 +494,8 @@ fn even_functions_of_distances_at_zero() {
         ("norm([x, y])*abs(sin(norm([x, y])))", 2.0),
         ("sqrt(x^2 + y^2)*abs(tanh(sqrt(x^2 + y^2)))", 2.0),
         ("hypot(x, y)*max(sin(hypot(x, y)), 0)", 2.0),
+        ("norm([x, y])*min(norm([x, y]), 3)", 2.0),
+        ("abs(x^2 + y^2)", 2.0),
         ("abs(sin(hypot(x, y)))^2", 2.0),
         ("exp(-norm([x, y])^2)", -2.0),
     ] {

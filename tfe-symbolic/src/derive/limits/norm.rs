@@ -228,7 +228,14 @@ impl Norm {
                 function,
                 arguments,
             } => {
-                let degrees = arguments.iter().map(|y| self.degree(graph, *y, depth));
+                // min(u, 2) is u where that vanishes.
+                let is_beyond = |y: &ExprId| match (function, graph.as_constant(*y)) {
+                    (Function::Min, Some(c)) => !c.is_negative(),
+                    (Function::Max, Some(c)) => c.is_negative(),
+                    _ => false,
+                };
+                let near = arguments.iter().filter(|y| !is_beyond(y));
+                let degrees = near.map(|y| self.degree(graph, *y, depth));
                 let least = degrees.reduce(f64::min).unwrap_or(0.0).max(0.0);
                 match function {
                     _ if is_small_with_its_argument(*function) => least,
