@@ -9,6 +9,31 @@ use crate::expr::sums::{factors_of, quotient};
 const LONG_SUM: usize = 8;
 
 impl Graph {
+    /// arccos(cos u) with the digits that cos u has no more near its extrema, and with the slope ±1.
+    pub(super) fn angle_of_cosine(&mut self, cosine: ExprId) -> Option<ExprId> {
+        let Node::Call {
+            function: Function::Cos,
+            arguments,
+        } = self.node(cosine)
+        else {
+            return None;
+        };
+        let u = arguments.clone();
+        let sine = self.call(Function::Sin, &u);
+        let angle = self.call(Function::Atan2, &[sine, cosine]);
+        let sign = self.call(Function::Sign, &[sine]);
+        Some(self.multiply(sign, angle))
+    }
+
+    /// Whether it is a sum of even powers with positive coefficients.
+    pub(super) fn is_sum_of_squares(&self, x: ExprId) -> bool {
+        let is_square = |y: ExprId| matches!(self.node(y), Node::Product(factors) if factors.iter().all(|(_, n)| n % 2 == 0));
+        self.as_sum(x).is_some_and(|(constant, terms)| {
+            let mut terms = terms.iter();
+            !constant.is_negative() && terms.all(|(c, y)| !c.is_negative() && is_square(*y))
+        })
+    }
+
     /// √x, where that is not just the function of x.
     pub(super) fn simpler_root(&mut self, x: ExprId) -> Option<ExprId> {
         if let Some(half) = self.root_of_square(x) {

@@ -161,21 +161,11 @@ impl Graph {
             (Function::Abs, Node::Product(factors)) if factors.iter().all(|(_, n)| n % 2 == 0) => {
                 return x;
             }
-            (Function::Abs, Node::Sum { constant, terms }) if !constant.is_negative() => {
-                let is_square = |y: ExprId| matches!(self.node(y), Node::Product(factors) if factors.iter().all(|(_, n)| n % 2 == 0));
-                if terms.iter().all(|(c, y)| !c.is_negative() && is_square(*y)) {
-                    return x;
+            (Function::Abs, Node::Sum { .. }) if self.is_sum_of_squares(x) => return x,
+            (Function::Acos, Node::Call { .. }) => {
+                if let Some(angle) = self.angle_of_cosine(x) {
+                    return angle;
                 }
-            }
-            (
-                Function::Acos,
-                Node::Call {
-                    function: Function::Cos,
-                    arguments,
-                },
-            ) => {
-                let arguments = arguments.clone();
-                return self.angle_of_cosine(&arguments, x);
             }
             _ => {}
         }
@@ -183,14 +173,6 @@ impl Graph {
             function,
             arguments: vec![x],
         })
-    }
-
-    /// arccos(cos u) with the digits that cos u has no more near its extrema, and with the slope ±1.
-    fn angle_of_cosine(&mut self, u: &[ExprId], cosine: ExprId) -> ExprId {
-        let sine = self.call(Function::Sin, u);
-        let angle = self.call(Function::Atan2, &[sine, cosine]);
-        let sign = self.call(Function::Sign, &[sine]);
-        self.multiply(sign, angle)
     }
 
     /// `then` where `left comparison right` holds, `otherwise` elsewhere.
