@@ -7,7 +7,7 @@
 pub(crate) mod allowed;
 mod projection;
 
-use crate::numbers::{distance, larger, row_of};
+use crate::numbers::{distance, larger, norm, row_of};
 use allowed::ConstrainedMotions;
 use nalgebra::{DMatrix, DVector};
 use projection::{Led, Projection, all_hold, hold, holonomic, step_to_planes};
@@ -258,7 +258,7 @@ fn consistent<M: Model<N>, const N: usize>(
             Led::Settled => hold(&residuals(&q, &still)),
             Led::Closer => false,
         };
-        if is_reached {
+        if is_reached || (projection.iterations == MAX && without_roundings(q, &given) != q) {
             break;
         }
         if projection.iterations == MAX {
@@ -268,7 +268,12 @@ fn consistent<M: Model<N>, const N: usize>(
             });
         }
     }
-    let velocities = constrained::velocity_for(model, t, &q, &v)?;
+    let mut velocities = constrained::velocity_for(model, t, &q, &v)?;
+    if !all_hold(&residuals(&q, &velocities)) {
+        // Numbers that are nothing but rounding errors of those given violate constraints by as much as they are.
+        q = without_roundings(q, &given);
+        velocities = without_roundings(constrained::velocity_for(model, t, &q, &v)?, &v);
+    }
     let residuals = residuals(&q, &velocities);
     if !all_hold(&residuals) {
         return Err(ConsistentError::Unreached {
@@ -284,6 +289,15 @@ fn consistent<M: Model<N>, const N: usize>(
         velocity: distance(&velocities, &v),
         rank: rank_of(&independent),
     })
+}
+
+/// These numbers, or zeros if they are rounding errors of those from which they come.
+fn without_roundings<const N: usize>(numbers: [f64; N], given: &[f64; N]) -> [f64; N] {
+    const ROUNDINGS: f64 = 64.0 * f64::EPSILON;
+    match norm(&numbers) <= ROUNDINGS * norm(given) {
+        true => [0.0; N],
+        false => numbers,
+    }
 }
 
 /// The number of independent constraints.

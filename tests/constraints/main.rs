@@ -6,6 +6,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod at_rest;
 mod bodies;
 mod elements;
 mod linkages;
