@@ -52,21 +52,31 @@ impl<M, const N: usize, L: Length<N>> fmt::Debug for Resolution<'_, M, N, L> {
     }
 }
 
-/// Selects the numbers 0, 1, 2, 4, 8, … of a sequence.
-#[derive(Clone, Copy, Debug, Default)]
+/// Selects the numbers 0, 1, g, g², … of a sequence.
+#[derive(Clone, Copy, Debug)]
 struct Sample {
     count: usize,
     next: usize,
+    /// g
+    growth: usize,
 }
 
 impl Sample {
+    fn new(growth: usize) -> Self {
+        Self {
+            count: 0,
+            next: 0,
+            growth,
+        }
+    }
+
     /// Counts an item; returns whether it is selected.
     fn takes(&mut self) -> bool {
         let number = self.count;
         self.count += 1;
         let is_next = number == self.next;
         if is_next {
-            self.next = (2 * number).max(1);
+            self.next = (self.growth * number).max(1);
         }
         is_next
     }
@@ -112,9 +122,17 @@ where
     M: Simulated<N, L> + 'm,
     L: Length<N>,
 {
+    /// The factor between the numbers of elements that are compared. One matrix makes all elements of a linear model that
+    /// does not depend on time: fewer are enough.
+    const GROWTH: usize = if M::FACTS.linear && !M::FACTS.time_dependent {
+        16
+    } else {
+        2
+    };
+
     pub(super) fn new(again: Again<'m, M>) -> Self {
         Self {
-            comparisons: Comparisons::new(again.chosen.element),
+            comparisons: Comparisons::new(again.chosen.element, Self::GROWTH),
             again,
             stepper: None,
         }
@@ -208,11 +226,11 @@ impl Choice {
     /// The number of elements passed for each comparison in such models.
     const ELEMENTS_A_COMPARISON: usize = 24;
 
-    fn new(element: Element) -> Self {
+    fn new(element: Element, growth: usize) -> Self {
         Self {
             quick: Self::DOUBTFUL.powf(2.0 / element.order() as f64),
-            doubtful: Sample::default(),
-            cut: Sample::default(),
+            doubtful: Sample::new(growth),
+            cut: Sample::new(2),
             passed: 0,
             work: (0, 0),
         }
@@ -250,9 +268,9 @@ impl Choice {
 }
 
 impl<const N: usize, L: Length<N>> Comparisons<N, L> {
-    fn new(element: Element) -> Self {
+    fn new(element: Element, growth: usize) -> Self {
         Self {
-            choice: Choice::new(element),
+            choice: Choice::new(element, growth),
             continued: None,
             found: Found::default(),
         }
