@@ -47,7 +47,7 @@ fn events_that_are_no_numbers_are_told() {
         panic!("{:?}", motion.warnings());
     };
     // In the first element that ends without a value, at one of its samples.
-    assert!((1.0..1.25).contains(&root), "{root}");
+    assert!((1.0..=1.25).contains(&root), "{root}");
     assert_eq!((shifted, log), (0.0, 0.0));
     let told = motion.warnings()[0].to_string();
     assert!(

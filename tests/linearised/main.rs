@@ -11,8 +11,6 @@ mod critical_speed;
 mod derivative;
 #[path = "../common/differences.rs"]
 mod differences;
-#[path = "../common/largest.rs"]
-mod largest;
 mod resolution;
 mod stiff;
 mod top;

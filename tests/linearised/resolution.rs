@@ -1,7 +1,7 @@
 //! Steps of linear models that do not resolve the motion have a warning, as those of other models. No iteration fails
 //! there, whatever the step: the equations of an element are linear.
 
-use crate::largest::larger;
+use crate::common::larger;
 use tfe::prelude::*;
 use tfe::{Motion, Warning};
 

@@ -5,16 +5,18 @@
 //! changes its sign, the step is made of arcs that end at the roots.
 
 mod arc;
+mod kinked;
 mod root;
 mod search;
 mod watched;
 
 use crate::constrained::velocity_of;
-use crate::cut::{Halving, Instant};
 use crate::error::StepError;
 use crate::model::{Form, Model};
 use alloc::vec::Vec;
 use arc::{Arc, arc};
+pub(crate) use kinked::Kinked;
+use kinked::{BEYOND, Effort, SHORTEST, is_later};
 pub(crate) use root::{Change, Root};
 use watched::Origin;
 pub(crate) use watched::{Log, Watched};
@@ -29,50 +31,8 @@ const WORK_OF_ONE: usize = 16;
 /// and faster without end, whereas many sites may reach their roots at almost the same time.
 const MAX_SHORT: u32 = 20;
 
-/// An arc shorter than this, relative to the step, only moves the state to the other side of a root nearby.
-const SHORTEST: f64 = 1e-6;
-
 /// The error of lengths of arcs, relative to the step; far from t = 0 differences of times have larger errors.
 const DIGITS: f64 = 1e-12;
-
-/// How far beyond an arc its polynomial is used, relative to the length of the arc.
-const BEYOND: f64 = 1e-3;
-
-/// A stepper whose elements can be evaluated inside.
-pub(crate) trait Kinked:
-    Halving<State: Clone, Kicks = Vec<<Self as Halving>::Kick>>
-{
-    /// Dense output of one step.
-    type Inside;
-
-    /// Dense output of the last step.
-    fn inside(&self) -> Self::Inside;
-
-    /// The state inside a step, or slightly beyond its end.
-    fn at(&self, inside: &Self::Inside, tau: f64) -> Self::State;
-
-    /// Makes the next step start without continuing the last polynomial.
-    fn forget(&mut self);
-
-    /// Appends the values of all switching functions; false, with nothing appended, where the velocity that they need
-    /// does not exist.
-    fn switches(&mut self, t: f64, state: &Self::State, values: &mut Vec<f64>) -> bool;
-
-    /// The number of points of an element, and whether some of them lie at its ends.
-    fn points(&self) -> (usize, bool);
-
-    /// Counts a crossing of a kink, at the end of the last piece: the root of a switching function, given by its index.
-    fn crossed(&mut self, switch: usize);
-
-    /// Called after a piece that leads over such a root.
-    fn stepped_over(&mut self) {}
-
-    /// Whether steps that fail are cut, whether or not there are kinks.
-    fn cuts(&self) -> bool;
-
-    /// With `all`, accept any root to which an iteration converges.
-    fn trust(&mut self, all: bool);
-}
 
 /// Appends the values of the switching functions of a model; false, with nothing appended, where there is no velocity.
 pub(crate) fn switches<M, const N: usize>(
@@ -127,14 +87,6 @@ fn watch<'a, const N: usize>(numbers: &[f64; N], log: &'a Log) -> [Watched<'a>; 
 /// The switching functions that have decided the derivatives of a model.
 fn deciding<const N: usize>(log: &Log, first: &crate::First<Watched<'_>, N>) -> Origin {
     log.deciding(first.z.iter().chain(&first.q).chain(&first.force))
-}
-
-/// The trials that all arcs of a step have taken.
-#[derive(Default)]
-struct Effort {
-    trials: usize,
-    /// Why the first failing arc failed.
-    failed: Option<StepError>,
 }
 
 /// Moves `state` from t to t + h in smooth arcs. On return, the stepper may still accept any root (see
@@ -219,15 +171,6 @@ fn rest_of(between: f64, left: f64, h: f64) -> f64 {
         left
     } else {
         between
-    }
-}
-
-/// Whether something acts after a time.
-fn is_later<K: Instant>(kick: &K, time: f64, h: f64) -> bool {
-    if h > 0.0 {
-        kick.time() >= time
-    } else {
-        kick.time() <= time
     }
 }
 

@@ -1,7 +1,7 @@
 //! One arc of a step: its end is the end of the step or the first root of a switching function (T-119).
 
+use super::kinked::{BEYOND, Effort, Kinked, SHORTEST, is_later};
 use super::search::{Crossing, begins_on_root, first_crossing};
-use super::{BEYOND, Effort, Kinked, SHORTEST, is_later};
 use crate::cut::is_of_newton;
 use crate::error::StepError;
 use alloc::vec::Vec;
