@@ -126,16 +126,8 @@ impl Inside {
 
     /// The derivatives of a loss of the polynomial along the element: one number for each column.
     pub(crate) fn product(&self, loss: &InsideLoss) -> DMatrix<f64> {
-        let width = self.width();
-        let mut row = DMatrix::zeros(1, width);
-        let weights = loss.start.iter().chain(&loss.coefficients);
-        let rows = self.slopes.start.chunks_exact(width);
-        let rows = rows.chain(self.slopes.coefficients.chunks_exact(width));
-        for (weight, slopes) in weights.zip(rows) {
-            for (sum, slope) in row.iter_mut().zip(slopes) {
-                *sum += weight * slope;
-            }
-        }
+        let mut row = DMatrix::zeros(1, self.width());
+        self.slopes.add_to(loss, row.as_mut_slice());
         self.through(&row)
     }
 

@@ -11,7 +11,7 @@ use super::setup::Simulation;
 use super::trail::is_same;
 use crate::error::{RunError, RunErrorKind};
 use crate::length::FixedLength;
-use crate::motion::{Motion, Node, Warning};
+use crate::motion::{Motion, Node};
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::loss::{Loss, LossGradient, Seen};
 use crate::sensitivity::slopes::directions;
@@ -87,9 +87,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             return run.record_every(1).forwards(start, span, loss);
         }
         let mut motion = run.drive(start, &span, identity, None)?;
-        if run.crosses_kinks() {
-            motion.add_warning(Warning::KinksCrossed);
-        }
+        run.warn_of_kinks(&mut motion);
         match run.descended(&motion, &span, loss) {
             Ok(Some((value, sums))) => Ok((value, run.gathered(motion, sums)?)),
             // A step that was too long was cut in one pass and not in the other.

@@ -9,7 +9,6 @@ use super::setup::Simulation;
 use crate::constraints::allowed;
 use crate::error::{RunError, RunErrorKind};
 use crate::linearised::Linearised;
-use crate::motion::Warning;
 use nalgebra::DMatrix;
 use std::convert::identity;
 use std::ops::Range;
@@ -51,9 +50,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
             bases: Vec::new(),
         };
         let mut motion = run.drive(start, &span, identity, Some(&mut matrices))?;
-        if run.crosses_kinks() {
-            motion.add_warning(Warning::KinksCrossed);
-        }
+        run.warn_of_kinks(&mut motion);
         matrices.close();
         let Matrices {
             tangents,

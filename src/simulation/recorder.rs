@@ -4,7 +4,7 @@ use super::events::Severed;
 use super::follow::{Follow, Follower, Passed};
 use super::kind::Simulated;
 use super::pieces::{Broken, Observe, Piece, Side};
-use super::resolution::{Examined, Resolution};
+use super::resolution::Resolution;
 use super::setup::Simulation;
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
@@ -247,16 +247,7 @@ where
     }
 
     fn whole(&mut self, stepper: &L::Stepper<'m, M>, piece: &Piece<'_, N, L>) {
-        if !piece.has_impulses {
-            let examined = Examined {
-                t: piece.start,
-                begin: piece.begin,
-                h: piece.h,
-                before: piece.before,
-                after: piece.after,
-            };
-            self.resolution.look(M::statistics(stepper), examined);
-        }
+        self.resolution.look_at(stepper, piece);
     }
 
     fn inside(&mut self, dense: L::Polynomial) {

@@ -2,6 +2,7 @@
 //! shorter elements (T-121).
 
 use super::kind::{Chosen, Simulated};
+use super::pieces::Piece;
 use crate::length::Length;
 use crate::motion::Warning;
 use std::fmt;
@@ -147,6 +148,20 @@ where
     /// The settings of the steps of the run.
     pub(super) fn chosen(&self) -> &Chosen {
         &self.again.chosen
+    }
+
+    /// Compares a piece if it is due, unless impulses act in it.
+    pub(super) fn look_at(&mut self, stepper: &L::Stepper<'m, M>, piece: &Piece<'_, N, L>) {
+        if !piece.has_impulses {
+            let examined = Examined {
+                t: piece.start,
+                begin: piece.begin,
+                h: piece.h,
+                before: piece.before,
+                after: piece.after,
+            };
+            self.look(M::statistics(stepper), examined);
+        }
     }
 
     /// Compares the element if it is due.

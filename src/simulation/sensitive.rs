@@ -13,7 +13,7 @@ use super::kind::Chosen;
 use super::setup::Simulation;
 use crate::constraints::tangent_basis;
 use crate::error::{RunError, RunErrorKind};
-use crate::motion::{Motion, Node, Warning};
+use crate::motion::{Motion, Node};
 use crate::sensitivity::Sensitive;
 use crate::sensitivity::inside::Before;
 use crate::sensitivity::slopes::directions;
@@ -89,9 +89,7 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
         mut tangents: Tangents<'m, M, N>,
     ) -> Result<Sensitive<N>, RunError<N>> {
         let mut motion = self.drive(start, &span, identity, Some(&mut tangents))?;
-        if self.crosses_kinks() {
-            motion.add_warning(Warning::KinksCrossed);
-        }
+        self.warn_of_kinks(&mut motion);
         Ok(tangents.into_sensitive(motion))
     }
 }

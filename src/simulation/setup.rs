@@ -7,6 +7,7 @@ use super::mesh::Grid;
 use super::resolution::Again;
 use crate::error::RunErrorKind;
 use crate::length::{Declared, FixedLength, Length};
+use crate::motion::{Motion, Warning};
 use crate::sensitivity::Loss;
 use std::ops::Range;
 use tfe_runtime::Share;
@@ -357,6 +358,13 @@ impl<M: Simulated<N, L>, const N: usize, L: Length<N>> Simulation<'_, M, N, L> {
     /// Whether forces may have kinks or jumps inside steps.
     pub(super) fn crosses_kinks(&self) -> bool {
         self.at_kinks != Some(true) && !M::FACTS.smooth
+    }
+
+    /// Warns of derivatives along a motion without the changes of the times of jumps.
+    pub(super) fn warn_of_kinks(&self, motion: &mut Motion<N, L>) {
+        if self.crosses_kinks() {
+            motion.add_warning(Warning::KinksCrossed);
+        }
     }
 }
 

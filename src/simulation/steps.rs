@@ -10,8 +10,7 @@ use super::times::Endless;
 use super::watch::{Recorded, Watch};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
-use crate::motion::Warning;
-use crate::motion::{Event, Node};
+use crate::motion::{Event, Node, Warning};
 use std::collections::VecDeque;
 use std::fmt;
 use tfe_runtime::Share;
@@ -436,16 +435,7 @@ where
     }
 
     fn whole(&mut self, stepper: &L::Stepper<'m, M>, piece: &Piece<'_, N, L>) {
-        if !piece.has_impulses {
-            let examined = Examined {
-                t: piece.start,
-                begin: piece.begin,
-                h: piece.h,
-                before: piece.before,
-                after: piece.after,
-            };
-            self.resolution.look(M::statistics(stepper), examined);
-        }
+        self.resolution.look_at(stepper, piece);
     }
 
     fn changed(&mut self, model: &Share<'m, M>, _: &[(usize, f64)]) {

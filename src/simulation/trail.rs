@@ -7,7 +7,7 @@ use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
 use crate::length::{Length, RunTimeLength};
-use crate::motion::{Event, Motion, Node, Warning};
+use crate::motion::{Event, Motion, Node};
 use crate::numbers::{larger, largest};
 use std::convert::identity;
 use std::ops::{ControlFlow, Range};
@@ -308,9 +308,7 @@ impl<'m, M: family::Model> Simulation<'m, M, 0, RunTimeLength> {
             trail.last.clone_from(&start);
         }
         let mut motion = self.drive(start, span, identity, Some(&mut trail))?;
-        if self.crosses_kinks() {
-            motion.add_warning(Warning::KinksCrossed);
-        }
+        self.warn_of_kinks(&mut motion);
         match Trail::<M>::refusal(&motion, call) {
             Some(kind) => Err(RunError::new(kind, motion)),
             None => Ok((motion, trail)),
