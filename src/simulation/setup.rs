@@ -248,13 +248,15 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
         self
     }
 
-    /// Sets whether steps end where a force has a kink or a jump, so that elements keep their order of accuracy.
+    /// Sets whether steps end where a force or a constraint has a kink or a jump, so that elements keep their order of accuracy.
     ///
     /// Kinks are found where the argument of `abs` or `sign`, the condition of `select`, or the difference of the
     /// arguments of `min` or `max` changes its sign, as a function of the state or of time (`docs/theory.md` §10.7).
     /// The run returns to its grid of steps after each kink; [`Statistics::kinks`](crate::Statistics::kinks) counts
     /// the crossings. A motion that would slide along a jump is an error,
-    /// [`StepError::Slides`](crate::runtime::StepError::Slides).
+    /// [`StepError::Slides`](crate::runtime::StepError::Slides). Where the gradient of a constraint jumps, as at a bend of
+    /// a wire that guides a bead, or a prescribed velocity does, the motion loses the velocity that is no longer allowed,
+    /// as in an impact without rebound.
     ///
     /// [`run`](Self::run), [`steps`](Self::steps), [`run_estimated`](Self::run_estimated) and [sections](Self::section)
     /// cut steps at kinks only after `at_kinks(true)`. Runs with an [`accuracy`](Self::accuracy), `run_linearised`,

@@ -28,4 +28,5 @@ mod spatial_four_bar;
 mod stability;
 mod starts;
 mod symplectic;
+mod through_zero;
 mod tolerances;

@@ -345,3 +345,90 @@ fn light_chains_move_as_heavy_ones() {
         assert!(off <= 1e-12, "{l:e} {m:e} {unit:e}: {off:.1e}");
     }
 }
+
+/// Beads on wires that bend at x = 0, with springs; the first wire is moved from a time on.
+#[dynamics(
+    coordinates(x[n], y[n]),
+    lagrangian = sum(i in 0..n, m/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]) - sum(i in 0..n-1, k/2*(x[i+1] - x[i])^2),
+    constraint(wire[i in 0..n]) = y[i] - r*max(x[i], 0) - u*max(t - s, 0),
+)]
+struct Bends {
+    n: usize,
+    m: f64,
+    g: f64,
+    k: f64,
+    r: f64,
+    u: f64,
+    s: f64,
+}
+
+#[dynamics(
+    coordinates(x[3], y[3]),
+    lagrangian = sum(i in 0..3, m/2*(dot(x[i])^2 + dot(y[i])^2) - m*g*y[i]) - sum(i in 0..2, k/2*(x[i+1] - x[i])^2),
+    constraint(wire[i in 0..3]) = y[i] - r*max(x[i], 0) - u*max(t - s, 0),
+)]
+struct ThreeBends {
+    m: f64,
+    g: f64,
+    k: f64,
+    r: f64,
+    u: f64,
+    s: f64,
+}
+
+#[test]
+fn beads_on_wires_that_bend_move_as_those_of_fixed_size() {
+    let (m, g, k, r, u, s) = (0.7, 9.81, 3.0, 0.4, 0.6, 0.21);
+    let (long, three) = of_both_lengths!(Bends(3), ThreeBends: m, g, k, r, u, s);
+    let q = [-0.5, -0.7, -1.2, 0.0, 0.0, 0.0];
+    let v = [2.0, 1.7, 1.9, 0.0, 0.0, 0.0];
+    for element in [3, 4, 7].map(Element::mixed) {
+        for step in [0.05, 0.13] {
+            let one = Simulation::new(&long).element(element).step(step);
+            let start = long.state(q, v);
+            let one = one.at_kinks(true).run(start, 0.0..0.9);
+            let other = Simulation::new(&three).element(element).step(step);
+            let other = other.at_kinks(true).run(three.state(q, v), 0.0..0.9);
+            let (one, other) = (one.expect("a run"), other.expect("a run of fixed size"));
+            let kinks = [one.statistics().kinks, other.statistics().kinks];
+            assert!(kinks[0] >= 4 && kinks[0] == kinks[1], "{kinks:?}");
+            let ends = one.last().q.iter().zip(&other.last().q);
+            let off = ends.fold(0.0, |most, (a, b)| larger(most, (a - b).abs()));
+            // Both cut their steps at the same roots, up to rounding.
+            assert!(off <= 1e-12, "{element} {step}: {off:.1e}");
+        }
+    }
+}
+
+/// Beads on wires with a stair.
+#[dynamics(
+    coordinates(x[n], y[n]),
+    lagrangian = sum(i in 0..n, (dot(x[i])^2 + dot(y[i])^2)/2),
+    constraint(wire[i in 0..n]) = y[i] - select(x[i] < 1, 0, d),
+)]
+struct Stairs {
+    n: usize,
+    d: f64,
+}
+
+#[test]
+fn a_jump_of_a_constrained_position_is_an_error() {
+    let stairs = Stairs { n: 2, d: 1e-5 };
+    let start = stairs.state([0.0, 0.5, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]);
+    let run = Simulation::new(&stairs).element(Mixed::<4>).step(0.1);
+    let run = run.at_kinks(true).run(start, 0.0..2.0);
+    let error = run.expect_err("no motion can jump");
+    let RunErrorKind::Solve { source, .. } = error.kind() else {
+        panic!("{error}");
+    };
+    let name = tfe::runtime::CoordinateName::element("wire", 1);
+    let StepError::Constraint(ConstraintError::Discontinuous {
+        constraint,
+        distance,
+    }) = source
+    else {
+        panic!("{error}");
+    };
+    assert_eq!(*constraint, name);
+    assert!((distance - 1e-5).abs() <= 1e-12, "{distance:e}");
+}

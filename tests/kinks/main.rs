@@ -1,5 +1,6 @@
 //! Forces with kinks and jumps: elements keep their order of accuracy, and an accuracy asked for is met or refused.
 
+mod constraints;
 mod derivatives;
 #[path = "../common/differences.rs"]
 mod differences;

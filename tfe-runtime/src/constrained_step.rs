@@ -6,8 +6,8 @@ use crate::constrained::element::{ConstrainedForm, ElementConstraints};
 use crate::constrained::layout::{Layout, check_element};
 use crate::constrained::node::{Bordered, own_velocity, solve_velocity};
 use crate::constrained::own::violated;
-use crate::constrained::residual::relative_residual;
-use crate::constrained::rows::{Independence, Rows};
+use crate::constrained::residual::{largest_gap, relative_residual};
+use crate::constrained::rows::{Independence, Rows, norm};
 use crate::control::START_TOLERANCE;
 use crate::equations::Span;
 use crate::error::{ConstraintError, StepError};
@@ -175,6 +175,11 @@ impl<const N: usize> Step<'_, N> {
         active: &mut [usize],
         scratch: &mut Scratch<'_>,
     ) -> Result<Begun<N>, StepError> {
+        // After a failure there is no polynomial to continue from.
+        memory.last = None;
+        if self.warm {
+            self.check_continuity(&self.velocity_at_end(scratch.unknowns), rows)?;
+        }
         let independence = match memory.independence {
             Some([_, end]) if self.warm => end,
             _ => rows.independence(),
@@ -191,13 +196,17 @@ impl<const N: usize> Step<'_, N> {
                 rows.combine_multipliers(&mut scratch.unknowns[place]);
             }
         }
-        // After a failure there is no polynomial to continue from.
-        memory.last = None;
         let (velocity, low) = if self.warm {
             (self.continued(scratch.unknowns), memory.low)
         } else {
             let v = self.cold(rows, active, scratch)?;
-            self.check_start(&v, rows)?;
+            if memory.is_behind_kink {
+                let State { q, p } = self.start;
+                let before = own_velocity(self.model, self.times.0, q, p, &v)?;
+                self.check_continuity(&before, rows)?;
+            } else {
+                self.check_start(&v, rows)?;
+            }
             self.combine(rows, (&v, &units), active);
             (v, State::ZERO)
         };
@@ -223,13 +232,18 @@ impl<const N: usize> Step<'_, N> {
     /// Sets the velocity at the end to that of the continued polynomial. Returns the velocity at the start: that at the
     /// end of the last element, which that element has left in the place of the other.
     fn continued(&self, unknowns: &mut [f64]) -> [f64; N] {
-        let places = self.layout.end(0)..self.layout.node(0);
-        let mut start = [0.0; N];
-        start.copy_from_slice(&unknowns[places.clone()]);
+        let start = self.velocity_at_end(unknowns);
         let rates = unknowns[..self.layout.rates()].as_chunks().0;
         let end: [f64; N] = end_velocity(&self.scheme, rates);
-        unknowns[places].copy_from_slice(&end);
+        unknowns[self.layout.end(0)..self.layout.node(0)].copy_from_slice(&end);
         start
+    }
+
+    /// The velocity at the end of the element with these unknowns.
+    fn velocity_at_end(&self, unknowns: &[f64]) -> [f64; N] {
+        let mut end = [0.0; N];
+        end.copy_from_slice(&unknowns[self.layout.end(0)..self.layout.node(0)]);
+        end
     }
 
     /// Sets the initial guess of constant velocity and zero reactions; returns the velocity.
@@ -270,6 +284,23 @@ impl<const N: usize> Step<'_, N> {
         }
         let places = [(t, start), (t + 0.5 * h, &middle)];
         rows.combine(self.model, places, (rate, units), active);
+    }
+
+    /// Refuses a start to which the motion has led, with velocity `v`, but whose positions constraints do not allow: their
+    /// values jump there.
+    fn check_continuity(&self, v: &[f64; N], rows: &Rows<'_, N>) -> Result<(), StepError> {
+        let gap = largest_gap(norm(&self.start.q), norm(v), self.times);
+        for (c, constraint) in self.model.declared().iter().enumerate() {
+            let distance = rows.distance(c);
+            if distance > gap {
+                return Err(ConstraintError::Discontinuous {
+                    constraint: CoordinateName::single(constraint.name),
+                    distance,
+                }
+                .into());
+            }
+        }
+        Ok(())
     }
 
     /// Refuses a start that violates the constraints by more than the tolerance of iterations may have left.

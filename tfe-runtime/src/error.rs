@@ -70,6 +70,13 @@ pub enum ConstraintError {
         /// The size of the violation: |φ| or |A v + a|, divided by the norm of its row.
         residual: f64,
     },
+    /// The value of a constraint on positions jumps, at a time or at a position, so that the motion would have to jump, too.
+    Discontinuous {
+        /// The constraint.
+        constraint: CoordinateName,
+        /// The distance of the positions from those that it allows behind the jump.
+        distance: f64,
+    },
     /// Some rows of the constraints are linearly dependent, and the redundant constraints are violated: either the
     /// constraints contradict each other, or the motion has met a singular position.
     Dependent {
@@ -116,6 +123,13 @@ impl fmt::Display for ConstraintError {
                 } else {
                     "velocity off by"
                 }
+            ),
+            Self::Discontinuous {
+                constraint,
+                distance,
+            } => write!(
+                f,
+                "the constraint `{constraint}` jumps, which no motion can follow: behind the jump the positions are off by {distance:.1e}; its value must be continuous in time and in the coordinates, and so must inputs on which it depends"
             ),
             Self::Dependent {
                 constraint,
@@ -212,8 +226,8 @@ pub enum StepError {
         /// The energy at its end.
         after: f64,
     },
-    /// After crossing a jump of a force, the motion returns to it at once: it would slide along the jump (Filippov),
-    /// which the equations as declared do not describe.
+    /// After crossing a jump of a force, or of the gradient of a constraint, the motion returns to it at once: it would
+    /// slide along the jump (Filippov), which the equations as declared do not describe.
     Slides,
     /// The step crosses more kinks or jumps of forces than it can be cut at.
     TooManyKinks,
@@ -319,7 +333,7 @@ impl fmt::Display for StepError {
                  take a shorter step, or accept any solution with `Solve::Trusting`"
             ),
             Self::Slides => f.write_str(
-                "the motion slides along a jump of a force: on either side of a change of a `sign`, `select` or the like, the force drives it back to the other side; \
+                "the motion slides along a jump of a force, or of the gradient of a constraint: on either side of a change of a `sign`, `select` or the like, it is driven back to the other side; \
                  replace the jump by a continuous law, such as tanh(v/w) for sign(v)",
             ),
             Self::TooManyKinks => f.write_str(

@@ -1,4 +1,4 @@
-//! Event location inside steps: steps are cut where forces have kinks or jumps (T-119).
+//! Event location inside steps: steps are cut where forces or constraints have kinks or jumps (T-119).
 //!
 //! `select`, `abs`, `sign`, `min` and `max` choose a branch by the sign of a switching function g(t, q, z). In an
 //! element in which no g changes its sign, the equations are smooth and the element has its full order. Where a g
@@ -8,18 +8,19 @@ mod arc;
 mod kinked;
 mod root;
 mod search;
+mod switches;
 mod watched;
 
-use crate::constrained::velocity_of;
 use crate::error::StepError;
-use crate::model::{Form, Model};
 use alloc::vec::Vec;
-use arc::{Arc, arc};
+use arc::{Arc, arc, is_of_the_iteration};
 pub(crate) use kinked::Kinked;
 use kinked::{BEYOND, Effort, SHORTEST, is_later};
 pub(crate) use root::{Change, Root};
-use watched::Origin;
-pub(crate) use watched::{Log, Watched};
+use search::past_root;
+pub use switches::switching_functions;
+pub(crate) use switches::{are_constraints_chosen, switches};
+pub(crate) use watched::{Log, Origin, Watched};
 
 /// All arcs of a step together may take this many trials,
 const MAX_WORK: usize = 1000;
@@ -33,61 +34,6 @@ const MAX_SHORT: u32 = 20;
 
 /// The error of lengths of arcs, relative to the step; far from t = 0 differences of times have larger errors.
 const DIGITS: f64 = 1e-12;
-
-/// Appends the values of the switching functions of a model; false, with nothing appended, where there is no velocity.
-pub(crate) fn switches<M, const N: usize>(
-    model: &M,
-    t: f64,
-    state: &crate::State<N>,
-    values: &mut Vec<f64>,
-) -> bool
-where
-    M: Model<N>,
-{
-    let z = match M::FORM {
-        Form::Lagrangian => {
-            let velocity = velocity_of(model, t, &state.q, &state.p, &[0.0; N]);
-            let Ok(velocity) = velocity else {
-                return false;
-            };
-            velocity
-        }
-        Form::Hamiltonian => state.p,
-    };
-    let log = Log::new(core::mem::take(values));
-    let mut first = crate::First::zero();
-    let (q, z) = (watch(&state.q, &log), watch(&z, &log));
-    model.first(Watched::new(t, &log), &q, &z, &mut first);
-    let origin = deciding(&log, &first);
-    *values = log.decisive(origin);
-    true
-}
-
-/// The values of the functions g(t, q, z) by whose signs the kernels of a model choose branches at a state, with z = v for
-/// a Lagrangian and z = p for a Hamiltonian, in an order that is always the same. One that decides nothing there is zero;
-/// a model that is smooth has none. `None` where there is no velocity.
-#[must_use]
-pub fn switching_functions<M, const N: usize>(
-    model: &M,
-    t: f64,
-    state: &crate::State<N>,
-) -> Option<Vec<f64>>
-where
-    M: Model<N>,
-{
-    let mut values = Vec::new();
-    switches(model, t, state, &mut values).then_some(values)
-}
-
-/// The numbers, with a log of their comparisons.
-fn watch<'a, const N: usize>(numbers: &[f64; N], log: &'a Log) -> [Watched<'a>; N] {
-    numbers.map(|number| Watched::new(number, log))
-}
-
-/// The switching functions that have decided the derivatives of a model.
-fn deciding<const N: usize>(log: &Log, first: &crate::First<Watched<'_>, N>) -> Origin {
-    log.deciding(first.z.iter().chain(&first.q).chain(&first.force))
-}
 
 /// Moves `state` from t to t + h in smooth arcs. On return, the stepper may still accept any root (see
 /// [`Kinked::trust`]).
@@ -113,7 +59,13 @@ pub(crate) fn in_arcs<S: Kinked + ?Sized>(
         stepper.trust(begins_at_root);
         let (from, kicked) = ((now, begins_at_root), &kicks);
         let rest = rest_of(end - now, left, h);
-        let arc = arc(stepper, from, (end, rest, h), state, kicked, &mut effort)?;
+        let arc = arc(stepper, from, (end, rest, h), state, kicked, &mut effort);
+        let arc = arc.map_err(
+            |error| match begins_at_root && is_of_the_iteration(&error) {
+                true => StepError::Slides,
+                false => error,
+            },
+        )?;
         let (Arc::Smooth { length } | Arc::Crossing { length, .. }) = arc;
         match arc {
             Arc::Crossing { switch, .. } if !seen.contains(&switch) => seen.push(switch),
@@ -122,10 +74,11 @@ pub(crate) fn in_arcs<S: Kinked + ?Sized>(
         if short > MAX_SHORT {
             return Err(StepError::Slides);
         }
-        let is_last = length == rest || now + length == end;
+        let mut is_last = length == rest || now + length == end;
         let until = if is_last { end } else { now + length };
         let (later, done) =
             (kicks.into_iter()).partition(|kick| is_later(kick, until, h) && !is_last);
+        stepper.begin_behind(false);
         if let (Arc::Smooth { .. }, true, true) = (&arc, is_last, now == t) {
             return Ok(());
         }
@@ -136,19 +89,19 @@ pub(crate) fn in_arcs<S: Kinked + ?Sized>(
             stepper.crossed(switch);
             crossings += 1;
             stepper.trust(true);
-            if slides(stepper, (now, length), h, switch, state) {
+            let inside = stepper.inside();
+            if slides(stepper, &inside, (now, length), h, switch, state) {
                 return Err(StepError::Slides);
             }
             let over = 2.0 * margin.copysign(h);
             // A step that the time cannot resolve is skipped.
             let is_step = margin > 0.0 && now + over != now;
-            if is_step && over.abs() < 0.5 * (end - now).abs() {
-                // A step across a jump may have no solution: each side leads back to the other.
-                let crossed = stepper.whole(now, over, state, &[]);
-                crossed.map_err(|_| StepError::Slides)?;
-                stepper.passed(now, over, Vec::new());
-                stepper.stepped_over();
+            let is_short = over.abs() < 0.5 * (end - now).abs();
+            if is_step && (is_short || stepper.has_constraint_kinks()) {
+                let place = (now, length);
+                let over = step_over(stepper, &inside, place, (switch, over), state)?;
                 (now, left) = (now + over, left - over);
+                is_last |= h.signum() * now >= h.signum() * end;
             }
         }
         if is_last {
@@ -160,6 +113,37 @@ pub(crate) fn in_arcs<S: Kinked + ?Sized>(
         }
     }
     Err(StepError::TooManyKinks)
+}
+
+/// Leads over the root of a switching function, which lies `over`/2 behind the last piece of this length, or nearer; returns
+/// how far.
+///
+/// # Errors
+/// [`StepError::Slides`] if there is no element that leads over it.
+fn step_over<S: Kinked + ?Sized>(
+    stepper: &mut S,
+    inside: &S::Inside,
+    (now, length): (f64, f64),
+    (switch, over): (usize, f64),
+    state: &mut S::State,
+) -> Result<f64, StepError> {
+    if stepper.has_constraint_kinks() {
+        // Where constraints jump there is no element from one side to the other: the velocity at one of its ends would
+        // not be allowed. The next element has an impulse at its start.
+        let part = past_root(0.5 * over / length, switch, &mut |part, row| {
+            let ahead = stepper.ahead(inside, part, state);
+            stepper.switches(now + part * length, &ahead, row);
+        });
+        *state = stepper.ahead(inside, part, state);
+        stepper.begin_behind(true);
+        return Ok(part * length);
+    }
+    // A step across a jump may have no solution: each side leads back to the other.
+    let crossed = stepper.whole(now, over, state, &[]);
+    crossed.map_err(|_| StepError::Slides)?;
+    stepper.passed(now, over, Vec::new());
+    stepper.stepped_over();
+    Ok(over)
 }
 
 /// What remains of a step h after arcs that leave `left` of it: the difference `between` the times, where it has the
@@ -181,6 +165,7 @@ fn rest_of(between: f64, left: f64, h: f64) -> f64 {
 /// tells how the motion continues on that side.
 fn slides<S: Kinked + ?Sized>(
     stepper: &mut S,
+    inside: &S::Inside,
     (time, length): (f64, f64),
     h: f64,
     switch: usize,
@@ -189,13 +174,12 @@ fn slides<S: Kinked + ?Sized>(
     if length.abs() < SHORTEST * h.abs() {
         return false;
     }
-    let inside = stepper.inside();
     let value = |stepper: &mut S, t: f64, state: &S::State| {
         let mut row = Vec::new();
         stepper.switches(t, state, &mut row);
         row.get(switch).copied().unwrap_or(f64::NAN)
     };
-    let mut behind = stepper.at(&inside, 1.0 + BEYOND);
+    let mut behind = stepper.at(inside, 1.0 + BEYOND);
     let (ahead, short) = (BEYOND * length, BEYOND * BEYOND * length);
     let before = value(stepper, time, state);
     let first = value(stepper, time + ahead, &behind);

@@ -91,6 +91,9 @@ pub struct Memory<const N: usize> {
     /// Whether the workspace already holds the initial guess of the next step, in addition to the velocity at the end
     /// of the last one.
     pub(crate) is_foreseen: bool,
+    /// Whether the state lies shortly behind a kink of constraints, where its velocity may be one that they only allowed
+    /// before.
+    pub(crate) is_behind_kink: bool,
 }
 
 /// The last step.
@@ -145,6 +148,7 @@ impl<const N: usize> Memory<N> {
             preference: Preference::NONE,
             independence: None,
             is_foreseen: false,
+            is_behind_kink: false,
         }
     }
 

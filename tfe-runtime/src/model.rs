@@ -115,7 +115,7 @@ pub struct Facts {
     pub linear: bool,
     /// The mixed second derivatives ∂²/∂z∂q vanish.
     pub separable: bool,
-    /// The energy function and the forces have no branches: no `select`, `abs`, `sign`, `min` or `max`.
+    /// The energy function, the forces and the constraints have no branches: no `select`, `abs`, `sign`, `min` or `max`.
     pub smooth: bool,
 }
 

@@ -265,6 +265,12 @@ impl<'a, const N: usize> Rows<'a, N> {
         dot(&self.rows[constraint], v) + self.drift[constraint]
     }
 
+    /// |φ| / |A| of one constraint: about the distance of the positions from those that it allows.
+    pub(crate) fn distance(&self, constraint: usize) -> f64 {
+        let length = norm(&self.rows[constraint]);
+        self.values[constraint].abs() / if length > 0.0 { length } else { 1.0 }
+    }
+
     /// Marks a largest set of independent rows with ones, and returns their number.
     ///
     /// This is Gram–Schmidt orthogonalisation with pivoting: the row with the largest orthogonal part, relative to its

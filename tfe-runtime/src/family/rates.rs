@@ -24,7 +24,7 @@ use super::start::violated;
 use super::tangent::Parts;
 use crate::basis::legendre_slopes;
 use crate::consistency::ModelError;
-use crate::constrained::residual::REST;
+use crate::constrained::residual::{REST, largest_gap, reach};
 use crate::control::{POSITION_ROUND_OFF, START_TOLERANCE};
 use crate::double_double::DoubleDouble;
 use crate::equations::{Increment, relative};
@@ -58,6 +58,9 @@ pub(super) struct Rates<M> {
     factored: f64,
     /// Whether starts that violate the constraints are refused.
     refuses: bool,
+    /// Whether the next step begins shortly behind a kink of constraints, with a velocity that they may only have allowed
+    /// before.
+    pub(super) is_behind_kink: bool,
     pub(super) points: Vec<Point>,
     rows: Rows,
     /// A at the start.
@@ -90,6 +93,7 @@ impl<M> Rates<M> {
             step: self.step,
             factored: self.factored,
             refuses: self.refuses,
+            is_behind_kink: self.is_behind_kink,
             points: self.points,
             rows: self.rows,
             start_rows: self.start_rows,
@@ -141,6 +145,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             step: vec![0.0; size],
             factored: f64::NAN,
             refuses: true,
+            is_behind_kink: false,
             points,
             start_rows: vec![0.0; rows.values.len()],
             rows,
@@ -191,12 +196,20 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         self.rows.evaluate(&*self.model, t, &self.start.q);
         self.start_rows.copy_from_slice(&self.rows.values);
         match last {
-            Some(length) => self.continue_rates(h / length),
+            Some(length) => {
+                self.check_continuity(&self.v_end, (t, h))?;
+                self.continue_rates(h / length);
+            }
             None => {
                 self.low.q.fill(0.0);
                 self.low.p.fill(0.0);
                 self.begin(t)?;
-                self.check_start(t, h)?;
+                if self.is_behind_kink {
+                    let before = self.own_velocity(t);
+                    self.check_continuity(before.as_ref().unwrap_or(&self.v_end), (t, h))?;
+                } else {
+                    self.check_start(t, h)?;
+                }
             }
         }
         let outcome = self.newton(t, h);
@@ -261,13 +274,30 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         differ.then(velocity)?.ok()
     }
 
+    /// Refuses a start to which the motion has led, with velocity `v`, but whose positions constraints do not allow: their
+    /// values jump there.
+    fn check_continuity(&self, v: &[f64], times: (f64, f64)) -> Result<(), StepError> {
+        if self.constraints == 0 || !self.refuses {
+            return Ok(());
+        }
+        let gap = largest_gap(largest(&self.start.q), largest(v), times);
+        let distances = self.rows.distances();
+        match distances.iter().position(|distance| *distance > gap) {
+            Some(row) => Err(ConstraintError::Discontinuous {
+                constraint: self.model.constraint_name(row),
+                distance: distances[row],
+            }
+            .into()),
+            None => Ok(()),
+        }
+    }
+
     /// Refuses a start that violates the constraints.
     fn check_start(&mut self, t: f64, h: f64) -> Result<(), StepError> {
         if self.constraints == 0 || !self.refuses {
             return Ok(());
         }
-        let extent = largest(&self.start.q);
-        let lengths = self.rows.lengths();
+        let extent = reach(largest(&self.start.q), largest(&self.v_end), h);
         let refused = |row: usize, position: bool, residual: f64| {
             let constraint = self.model.constraint_name(row);
             Err(ConstraintError::Start {
@@ -277,8 +307,7 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             }
             .into())
         };
-        for (row, (phi, length)) in self.rows.phi.iter().zip(&lengths).enumerate() {
-            let distance = phi.abs() / if *length > 0.0 { *length } else { 1.0 };
+        for (row, distance) in self.rows.distances().into_iter().enumerate() {
             if !(distance <= START_TOLERANCE * extent || distance == 0.0) {
                 return refused(row, true, distance / extent);
             }
@@ -297,7 +326,8 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         let impulse =
             largest(&self.start.p).max(REST * extent / h.abs() * self.node.largest_mass());
         if !(off <= START_TOLERANCE * impulse || off == 0.0) {
-            let shares = self.node.multipliers().iter().zip(&lengths);
+            let lengths = self.rows.lengths();
+            let shares = self.node.multipliers().iter().zip(lengths);
             let (row, _) = shares
                 .map(|(eta, length)| (eta * length).abs())
                 .enumerate()

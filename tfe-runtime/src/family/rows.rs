@@ -68,6 +68,16 @@ impl Rows {
         self.pattern.add_product(&self.values, 1.0, v, rate);
     }
 
+    /// |φ| / |A| of each row: about the distance of the positions from those that it allows.
+    pub(super) fn distances(&self) -> Vec<f64> {
+        let mut distances = self.lengths();
+        for (distance, phi) in distances.iter_mut().zip(&self.phi) {
+            let length = if *distance > 0.0 { *distance } else { 1.0 };
+            *distance = phi.abs() / length;
+        }
+        distances
+    }
+
     /// |A| of each row.
     pub(super) fn lengths(&self) -> Vec<f64> {
         let mut lengths = vec![0.0; self.phi.len()];

@@ -48,6 +48,8 @@ pub struct Stepper<'m, M> {
     control: Control,
     /// Whether steps are cut at kinks, if there are any.
     at_kinks: bool,
+    /// Whether constraints have branches.
+    has_constraint_kinks: bool,
     /// The pieces of the last step, if it was cut.
     pieces: Vec<DenseElement>,
 }
@@ -150,6 +152,7 @@ impl<'m, M: Model> Stepper<'m, M> {
             instant: None,
             control,
             at_kinks: false,
+            has_constraint_kinks: false,
             pieces: Vec::new(),
         }
     }

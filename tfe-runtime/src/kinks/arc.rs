@@ -354,7 +354,7 @@ impl LengthSearch {
 }
 
 /// Whether a shorter arc may succeed.
-fn is_of_the_iteration(error: &StepError) -> bool {
+pub(super) fn is_of_the_iteration(error: &StepError) -> bool {
     is_of_newton(error)
         || matches!(
             error,

@@ -30,7 +30,7 @@ pub(crate) trait Kinked:
     /// does not exist.
     fn switches(&mut self, t: f64, state: &Self::State, values: &mut Vec<f64>) -> bool;
 
-    /// The number of points of an element, and whether some of them lie at its ends.
+    /// The number of points of an element, and whether something with branches is evaluated at its ends.
     fn points(&self) -> (usize, bool);
 
     /// Counts a crossing of a kink, at the end of the last piece: the root of a switching function, given by its index.
@@ -38,6 +38,16 @@ pub(crate) trait Kinked:
 
     /// Called after a piece that leads over such a root.
     fn stepped_over(&mut self) {}
+
+    /// Whether constraints have branches.
+    fn has_constraint_kinks(&self) -> bool;
+
+    /// The end of a piece moved along its polynomial by a small part of its length.
+    fn ahead(&self, inside: &Self::Inside, part: f64, end: &Self::State) -> Self::State;
+
+    /// Says whether the next step begins shortly behind a kink of constraints, where it may have a velocity that they only
+    /// allowed before.
+    fn begin_behind(&mut self, is_behind: bool);
 
     /// Whether steps that fail are cut, whether or not there are kinks.
     fn cuts(&self) -> bool;

@@ -1,10 +1,11 @@
 //! How the time of a root of a switching function changes with the motion and with parameters.
 
-use super::watched::{Log, Watched};
+use super::switches::deciding;
+use super::watched::Log;
 use crate::constrained::{VelocitySlope, velocity_of};
 use crate::dual::{Dual, duals};
 use crate::error::StepError;
-use crate::model::{First, Form, Model, State};
+use crate::model::{Form, Model, State};
 use alloc::vec::Vec;
 
 /// A change of a point of a motion.
@@ -61,10 +62,7 @@ impl<'a, M: Model<N>, const N: usize> Root<'a, M, N> {
             Form::Hamiltonian => p,
         };
         let log = Log::new(Vec::new());
-        let watch = |numbers: &[Dual; N]| numbers.map(|number| Watched::new(number, &log));
-        let (q, z) = (watch(&q), watch(&z));
-        let mut first = First::zero();
-        self.model.first(Watched::new(t, &log), &q, &z, &mut first);
+        deciding(self.model, (t, &q, &z), &log);
         log.values()
             .get(self.switch)
             .map_or(f64::NAN, |value| value.slope)

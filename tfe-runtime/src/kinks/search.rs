@@ -1,5 +1,6 @@
 //! The search for the first root of the switching functions along a step.
 
+use super::kinked::BEYOND;
 use crate::root::root;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -87,6 +88,23 @@ fn value(values: &mut dyn FnMut(f64, &mut Vec<f64>), switch: usize, tau: f64) ->
 /// One of the values at a place; NaN, which has no sign, if there are none.
 fn value_in(row: &[f64], switch: usize) -> f64 {
     row.get(switch).copied().unwrap_or(f64::NAN)
+}
+
+/// The part of the length of a piece, at least `least`, after which a function, given by its index, has changed its sign
+/// behind the end of the piece. `values` gives the functions on the polynomial of the piece, from its end.
+pub(super) fn past_root(
+    least: f64,
+    switch: usize,
+    values: &mut dyn FnMut(f64, &mut Vec<f64>),
+) -> f64 {
+    let side = value(values, switch, -BEYOND);
+    let (mut past, mut more) = (least, f64::EPSILON);
+    // The times and coordinates may have fewer digits than the part.
+    while past < BEYOND && side * value(values, switch, past) > 0.0 {
+        past += more;
+        more *= 2.0;
+    }
+    past
 }
 
 /// Whether any of the functions is zero at the start, up to its change within the resolution, and non-zero soon after.

@@ -117,8 +117,9 @@ impl<R: Signed> Log<R> {
         }
     }
 
+    /// The union of two origins.
     #[inline]
-    fn both(&self, one: Origin, other: Origin) -> Origin {
+    pub(crate) fn both(&self, one: Origin, other: Origin) -> Origin {
         let late = match (one.late, other.late) {
             (Some(a), Some(b)) if a != b => {
                 let mut notes = self.0.borrow_mut();

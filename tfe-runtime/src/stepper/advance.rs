@@ -8,7 +8,7 @@ use crate::constrained::trail::Of;
 use crate::cut::{Halving, Instant};
 use crate::dense::DenseElement;
 use crate::error::StepError;
-use crate::kinks::{Kinked, in_arcs, switches};
+use crate::kinks::{Kinked, are_constraints_chosen, in_arcs, switches};
 use crate::method::{Impulse, Interval, Memory, Method};
 use crate::model::{Model, State};
 use crate::newton::{Control, Solve};
@@ -73,6 +73,9 @@ where
             return false;
         }
         self.common.at_kinks = !switches.is_empty();
+        if Self::HAS_CONSTRAINTS {
+            self.common.has_constraint_kinks = are_constraints_chosen(&*self.model, t, &state.q);
+        }
         // Dense output is needed for every step.
         self.common.carried.ends_only &= !self.common.at_kinks;
         self.common.at_kinks
@@ -88,6 +91,7 @@ where
     ) -> Result<(), StepError> {
         let memory = &self.common.carried.memory;
         let (start, low, steps) = (*state, memory.low, memory.statistics.steps);
+        let begins_behind = memory.is_behind_kink;
         let any: &mut AnyKinked<'_, N> = self;
         let outcome = in_arcs(any, (t, h), state, impulses);
         self.trust(false);
@@ -95,6 +99,7 @@ where
         carried.memory.statistics.steps = steps + u64::from(outcome.is_ok());
         if outcome.is_err() {
             (*state, carried.memory.low, carried.memory.last) = (start, low, None);
+            carried.memory.is_behind_kink = begins_behind;
             carried.pieces.clear();
         }
         outcome
@@ -310,7 +315,9 @@ where
 
     fn points(&self) -> (usize, bool) {
         let scheme = self.common.table.view();
-        (scheme.points(), scheme.has_ends())
+        // Constraints are evaluated at the ends of every element.
+        let has_ends = scheme.has_ends() || self.common.has_constraint_kinks;
+        (scheme.points(), has_ends)
     }
 
     fn crossed(&mut self, switch: usize) {
@@ -320,6 +327,22 @@ where
 
     fn stepped_over(&mut self) {
         self.common.last_piece_ends(Ends::Behind);
+    }
+
+    fn has_constraint_kinks(&self) -> bool {
+        self.common.has_constraint_kinks
+    }
+
+    fn ahead(&self, inside: &DenseElement<N>, part: f64, end: &State<N>) -> State<N> {
+        let (here, there) = (inside.at(1.0), inside.at(1.0 + part));
+        State {
+            q: core::array::from_fn(|a| end.q[a] + (there.q[a] - here.q[a])),
+            p: core::array::from_fn(|a| end.p[a] + (there.p[a] - here.p[a])),
+        }
+    }
+
+    fn begin_behind(&mut self, is_behind: bool) {
+        self.common.carried.memory.is_behind_kink = is_behind;
     }
 
     fn cuts(&self) -> bool {

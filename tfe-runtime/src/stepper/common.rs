@@ -53,6 +53,8 @@ pub(super) struct Common<const N: usize> {
     pub(super) is_of_points: bool,
     /// Whether steps are cut at kinks, if there are any.
     pub(super) at_kinks: bool,
+    /// Whether constraints have branches.
+    pub(super) has_constraint_kinks: bool,
     /// The requested kind of iteration; the one in use may accept more roots.
     pub(super) solve: Solve,
     /// The initial guess of the next step from another run of the same motion.
@@ -74,6 +76,7 @@ impl<const N: usize> Clone for Common<N> {
             weights: self.weights.clone(),
             is_of_points: self.is_of_points,
             at_kinks: self.at_kinks,
+            has_constraint_kinks: self.has_constraint_kinks,
             solve: self.solve,
             foreseen: self.foreseen.clone(),
             extra: Vec::new(),
@@ -98,6 +101,7 @@ impl<const N: usize> Common<N> {
             weights: None,
             is_of_points: false,
             at_kinks: false,
+            has_constraint_kinks: false,
             solve: control.solve,
             foreseen: Foreseen::default(),
             extra: Vec::new(),

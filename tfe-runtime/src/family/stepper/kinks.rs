@@ -3,8 +3,8 @@
 use super::{Stepper, Way};
 use crate::error::StepError;
 use crate::family::dense::DenseElement;
-use crate::family::model::{FamilyState, Gradient, Model};
-use crate::kinks::{Kinked, Log, Watched, in_arcs};
+use crate::family::model::{Block, Entries, FamilyState, Gradient, Model};
+use crate::kinks::{Kinked, Log, Origin, Watched, in_arcs};
 use crate::model::Form;
 use crate::real::Real as _;
 use crate::scheme::Tables as _;
@@ -33,7 +33,17 @@ impl<M: Model> Stepper<'_, M> {
             return false;
         }
         self.at_kinks = !switches.is_empty();
+        self.has_constraint_kinks = self.are_constraints_chosen(t, state);
         self.at_kinks
+    }
+
+    /// Whether constraints have branches.
+    fn are_constraints_chosen(&self, t: f64, state: &FamilyState) -> bool {
+        let log = Log::new(Vec::new());
+        let q = watch(&state.q, &log);
+        deciding_constraints(&*self.model, Watched::new(t, &log), &q, &log);
+        drop(q);
+        !log.values().is_empty()
     }
 
     #[cold]
@@ -84,13 +94,9 @@ impl<M: Model> Kinked for Stepper<'_, M> {
             Form::Hamiltonian => None,
         };
         let log = Log::new(core::mem::take(values));
-        let watched = |numbers: &[f64]| -> Vec<Watched<'_>> {
-            let all = numbers.iter().map(|number| Watched::new(*number, &log));
-            all.collect()
-        };
         let (q, z) = (
-            watched(&state.q),
-            watched(velocity.as_ref().unwrap_or(&state.p)),
+            watch(&state.q, &log),
+            watch(velocity.as_ref().unwrap_or(&state.p), &log),
         );
         let zeros = || vec![Watched::from_f64(0.0); self.length];
         let (mut by_z, mut by_q, mut force) = (zeros(), zeros(), zeros());
@@ -100,8 +106,9 @@ impl<M: Model> Kinked for Stepper<'_, M> {
             force: &mut force,
         };
         self.model.first(Watched::new(t, &log), &q, &z, first);
-        let results = by_z.iter().chain(&by_q).chain(&force);
-        let origin = log.deciding(results);
+        let forces = log.deciding(by_z.iter().chain(&by_q).chain(&force));
+        let constraints = deciding_constraints(&*self.model, Watched::new(t, &log), &q, &log);
+        let origin = log.both(forces, constraints);
         drop((q, z, by_z, by_q, force));
         *values = log.decisive(origin);
         true
@@ -113,11 +120,39 @@ impl<M: Model> Kinked for Stepper<'_, M> {
             #[cfg(feature = "sparse")]
             Way::Rates(rates) => rates.table().view(),
         };
-        (scheme.points(), scheme.has_ends())
+        // Constraints are evaluated at the ends of every element.
+        (
+            scheme.points(),
+            scheme.has_ends() || self.has_constraint_kinks,
+        )
     }
 
     fn crossed(&mut self, _: usize) {
         self.statistics_mut().kinks += 1;
+    }
+
+    fn has_constraint_kinks(&self) -> bool {
+        self.has_constraint_kinks
+    }
+
+    fn ahead(&self, inside: &DenseElement, part: f64, end: &FamilyState) -> FamilyState {
+        let (here, there) = (inside.at(1.0), inside.at(1.0 + part));
+        let moved = |end: &[f64], here: &[f64], there: &[f64]| {
+            let ends = end.iter().zip(here).zip(there);
+            ends.map(|((end, here), there)| end + (there - here))
+                .collect()
+        };
+        FamilyState {
+            q: moved(&end.q, &here.q, &there.q),
+            p: moved(&end.p, &here.p, &there.p),
+        }
+    }
+
+    fn begin_behind(&mut self, _is_behind: bool) {
+        #[cfg(feature = "sparse")]
+        if let Way::Rates(rates) = &mut self.way {
+            rates.is_behind_kink = _is_behind;
+        }
     }
 
     fn cuts(&self) -> bool {
@@ -127,4 +162,34 @@ impl<M: Model> Kinked for Stepper<'_, M> {
     fn trust(&mut self, all: bool) {
         self.way.control_mut().solve = self.control.solve.trusting(all);
     }
+}
+
+/// The switching functions that have decided the constraints, their gradients and their drift.
+fn deciding_constraints<'a, M: Model>(
+    model: &M,
+    t: Watched<'a>,
+    q: &[Watched<'a>],
+    log: &Log,
+) -> Origin {
+    let zeros = || vec![Watched::from_f64(0.0); model.constraints()];
+    let (mut values, mut drift) = (zeros(), zeros());
+    let mut rows = Collected(Vec::new());
+    model.constraint_values(t, q, &mut values);
+    model.constraint_rows(t, q, &mut drift, &mut rows);
+    log.deciding(values.iter().chain(&drift).chain(&rows.0))
+}
+
+/// The contributions to a matrix.
+struct Collected<'a>(Vec<Watched<'a>>);
+
+impl<'a> Entries<Watched<'a>> for Collected<'a> {
+    fn add(&mut self, _: Block, _: usize, _: usize, value: Watched<'a>) {
+        self.0.push(value);
+    }
+}
+
+/// The numbers, with a log of their comparisons.
+fn watch<'a>(numbers: &[f64], log: &'a Log) -> Vec<Watched<'a>> {
+    let all = numbers.iter().map(|number| Watched::new(*number, log));
+    all.collect()
 }
