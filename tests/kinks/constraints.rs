@@ -2,6 +2,7 @@
 //! does, and a jump of a constrained position is an error.
 
 use crate::apart;
+use crate::differences::difference_over;
 use crate::largest::larger;
 use tfe::prelude::*;
 use tfe::runtime::{ConstraintError, StepError};
@@ -62,7 +63,8 @@ fn beads_lose_the_velocity_across_a_bend_of_their_wire() {
                 assert_eq!(motion.statistics().kinks, 1, "{element} {step}");
                 let [exact, ..] = on_ramp(&ramp, start, t);
                 let off = apart(&motion.last().q, &[exact, r * exact]);
-                assert!(off <= 1e-15, "{r} {element} {step}: {off:.1e}");
+                // The motion behind a bend begins some roundings of the time late.
+                assert!(off <= 1e-14, "{r} {element} {step}: {off:.1e}");
             }
         }
     }
@@ -323,4 +325,108 @@ fn a_bead_that_stays_at_a_corner_is_told() {
     assert!((0.0..=0.01).contains(&ahead), "{ahead}");
     let worst = larger(0.0, (last.q[0] + 0.7 - 9.81 * last.t * last.t / 4.0).abs());
     assert!(worst <= 1e-13, "{worst:.1e}");
+}
+
+/// A disk that is driven from rest, and a second one that a brake holds until a clutch joins it to the first.
+#[dynamics(
+    coordinates(a, b),
+    lagrangian = ja/2*dot(a)^2 + jb/2*dot(b)^2,
+    force(a) = m,
+    constraint(clutch) = select(t < s, dot(b), dot(a) - dot(b)),
+)]
+struct Clutch {
+    ja: f64,
+    jb: f64,
+    m: f64,
+    s: f64,
+}
+
+#[test]
+fn a_clutch_joins_disks_in_a_moment() {
+    let clutch = Clutch {
+        ja: 1.0,
+        jb: 2.0,
+        m: 1.5,
+        s: 0.5,
+    };
+    let Clutch { ja, jb, m, s } = clutch;
+    let (until, start) = (1.2, clutch.state([0.0, 0.0], [0.0, 0.0]));
+    let (both, tau) = (ja + jb, until - s);
+    let speed = m * s / both;
+    let angle = speed * tau + m / both * tau * tau / 2.0;
+    let exact = [m / ja * s * s / 2.0 + angle, angle];
+    for element in [3, 4, 7].map(Element::mixed) {
+        for step in [0.1, 0.07, 0.03] {
+            let run = Simulation::new(&clutch).element(element).step(step);
+            let cut = run.clone().at_kinks(true).run(start, 0.0..until);
+            let at_break = run.break_at(s).run(start, 0.0..until);
+            for motion in [cut, at_break] {
+                let motion = motion.unwrap_or_else(|error| panic!("{element} {step}: {error}"));
+                let off = apart(&motion.last().q, &exact);
+                // As above.
+                assert!(off <= 1e-14, "{element} {step}: {off:.1e}");
+            }
+        }
+    }
+}
+
+/// A flywheel that lifts a follower by a cam, against a spring, and the same with the angle alone.
+#[dynamics(
+    coordinates(phi, s),
+    lagrangian = j/2*dot(phi)^2 + m/2*dot(s)^2 - k/2*(s + d)^2,
+    constraint(cam) = s - e*max(sin(phi), 0)^2,
+    force(phi) = 0.3,
+)]
+#[derive(Clone)]
+struct Cam {
+    j: f64,
+    m: f64,
+    k: f64,
+    d: f64,
+    e: f64,
+}
+
+#[dynamics(
+    coordinates(phi),
+    let s = e*max(sin(phi), 0)^2,
+    lagrangian = j/2*dot(phi)^2 + m/2*dot(s)^2 - k/2*(s + d)^2,
+    force(phi) = 0.3,
+)]
+struct CamAngle {
+    j: f64,
+    m: f64,
+    k: f64,
+    d: f64,
+    e: f64,
+}
+
+#[test]
+fn cams_move_as_their_angles() {
+    let (j, m, k, d, e) = (0.1, 0.2, 50.0, 0.02, 0.05);
+    let cam = Cam { j, m, k, d, e };
+    let angle = CamAngle { j, m, k, d, e };
+    let exact = Simulation::new(&angle)
+        .element(Mixed::<8>)
+        .step(0.01)
+        .at_kinks(true)
+        .run(angle.state([-0.3], [8.0]), 0.0..3.0)
+        .expect("the motion of the angle");
+    let run = |cam: &Cam| {
+        let start = cam.state([-0.3, 0.0], [8.0, 0.0]);
+        let run = Simulation::new(cam).element(Mixed::<8>).step(0.01);
+        run.at_kinks(true).run(start, 0.0..3.0).expect("a motion")
+    };
+    let motion = run(&cam);
+    assert_eq!(motion.statistics().kinks, 12);
+    let off = (motion.last().q[0] - exact.last().q[0]).abs();
+    assert!(off <= 1e-12 * exact.last().q[0].abs(), "{off:.1e}");
+    let start = cam.state([-0.3, 0.0], [8.0, 0.0]);
+    let simulation = Simulation::new(&cam).element(Mixed::<8>).step(0.01);
+    let sensitive = simulation
+        .run_sensitive(start, 0.0..3.0)
+        .expect("derivatives");
+    let at = |k: f64| [run(&Cam { k, ..cam.clone() }).last().q[0]];
+    let [by_k] = difference_over(0.5, at, k);
+    let off = (sensitive.by("k").last().q[0] - by_k).abs();
+    assert!(off <= 1e-10, "{off:.1e}");
 }

@@ -32,6 +32,9 @@ const WORK_OF_ONE: usize = 16;
 /// and faster without end, whereas many sites may reach their roots at almost the same time.
 const MAX_SHORT: u32 = 20;
 
+/// The number of roundings of the time after which a start behind a root counts as behind it.
+const DISTINCT: f64 = 16.0;
+
 /// The error of lengths of arcs, relative to the step; far from t = 0 differences of times have larger errors.
 const DIGITS: f64 = 1e-12;
 
@@ -130,7 +133,9 @@ fn step_over<S: Kinked + ?Sized>(
     if stepper.has_constraint_kinks() {
         // Where constraints jump there is no element from one side to the other: the velocity at one of its ends would
         // not be allowed. The next element has an impulse at its start.
-        let part = past_root(0.5 * over / length, switch, &mut |part, row| {
+        let roundings = DISTINCT * f64::EPSILON * now.abs().max(length.abs());
+        let least = 0.5 * over.abs() + roundings;
+        let part = past_root(least / length.abs(), switch, &mut |part, row| {
             let ahead = stepper.ahead(inside, part, state);
             stepper.switches(now + part * length, &ahead, row);
         });

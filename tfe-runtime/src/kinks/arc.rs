@@ -294,8 +294,11 @@ impl LengthSearch {
         if !self.bad.is_finite() {
             return None;
         }
-        let until = (self.bad / self.length).min(2.0);
-        first_crossing(1.0..until, 4, self.resolution / self.length, values)
+        let resolution = self.resolution / self.length;
+        // The step that failed may have a point on a root at its end.
+        let behind = if self.has_ends { resolution } else { 0.0 };
+        let until = (self.bad / self.length).min(2.0) + behind;
+        first_crossing(1.0..until, 4, resolution, values)
     }
 
     /// Accepts an arc without a root. If the step begins on a root, a short arc is made first that leaves it.

@@ -12,9 +12,9 @@
 pub(crate) mod sites;
 
 use crate::derive::entry::Entry;
+use crate::derive::structure::deciding;
 use crate::expr::constant::Constant;
 use crate::expr::differentiate::{Forward, derivative, gradient};
-use crate::expr::function::Function;
 use crate::expr::graph::{ExprId, Graph, Node};
 use crate::expr::input::{Affine, Input};
 use crate::expr::sorting::sort;
@@ -249,20 +249,12 @@ fn holds(graph: &Graph, id: ExprId, pick: Pick) -> bool {
     !leaves(graph, &[id], pick).is_empty()
 }
 
-/// Whether a leaf of this kind is an argument of a function with a kink or a jump, whose derivatives do not tell its
+/// Whether a leaf of this kind decides which branch of an expression is chosen, so that its derivatives do not tell its
 /// degree.
 fn has_kink_in(graph: &Graph, id: ExprId, pick: Pick) -> bool {
-    graph.reachable(&[id]).into_iter().any(|id| {
-        let kinked = match graph.node(id) {
-            Node::Select { .. } => true,
-            Node::Call { function, .. } => matches!(
-                function,
-                Function::Abs | Function::Sign | Function::Min | Function::Max
-            ),
-            _ => false,
-        };
-        kinked && holds(graph, id, pick)
-    })
+    (graph.reachable(&[id]).into_iter())
+        .flat_map(|id| deciding(graph.node(id)))
+        .any(|decides| holds(graph, decides, pick))
 }
 
 /// Whether an expression depends on velocities.
