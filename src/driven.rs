@@ -180,8 +180,8 @@ impl<'m, M, L> Driven<'m, M, L> {
     }
 
     /// Gives an input as a table of values at given times; before the first time and after the last it is constant.
-    /// Elements must end at these times to keep their order of accuracy:
-    /// [`Simulation::table`](crate::Simulation::table) does this.
+    /// Elements of runs, fits and ensembles of this model end at these times, so that they keep their order of accuracy;
+    /// those of orbits, boundary-value problems and optimal controls do not.
     ///
     /// # Errors
     /// [`InputError::Unknown`] if the model does not declare the input, [`InputError::Table`] if the table is invalid.

@@ -8,6 +8,20 @@ use tfe_runtime::family::{self, FamilyState};
 use tfe_runtime::step::{DenseElement, Impulse, Stepper, Suspended};
 use tfe_runtime::{CoordinateName, State};
 
+/// The times at which elements of runs of several models should end, in order.
+pub(crate) fn breaks_of<'m, M, const N: usize>(models: impl IntoIterator<Item = &'m M>) -> Vec<f64>
+where
+    M: Declared<N> + 'm,
+{
+    let mut breaks = Vec::new();
+    for model in models {
+        model.breaks(&mut |time| breaks.push(time));
+    }
+    breaks.sort_by(f64::total_cmp);
+    breaks.dedup();
+    breaks
+}
+
 /// The kind of length of a model, which determines the vectors of its states: arrays for [`FixedLength`], `Vec`s for
 /// [`RunTimeLength`]. There is no other kind.
 ///

@@ -30,6 +30,10 @@ impl<M: Controlled<N>, const N: usize> Model<N> for Driven<'_, M> {
         self.sources.failure(M::INPUTS)
     }
 
+    fn breaks_of_inputs<F: FnMut(f64)>(&self, report: &mut F) {
+        self.sources.times_of_tables().for_each(report);
+    }
+
     const FORM: Form = M::FORM;
     const FACTS: Facts = Facts {
         time_dependent: true,

@@ -7,6 +7,10 @@ use tfe_runtime::{CoordinateName, Facts, Form, InputFailure, InputPanicked, Real
 
 impl<M: Controlled> Declared<0> for Driven<'_, M, RunTimeLength> {
     type Length = RunTimeLength;
+
+    fn breaks<F: FnMut(f64)>(&self, report: &mut F) {
+        self.sources.times_of_tables().for_each(report);
+    }
 }
 
 impl<M: Controlled> Model for Driven<'_, M, RunTimeLength> {

@@ -96,6 +96,14 @@ impl Sources<'_> {
         }
     }
 
+    /// The times of all tables.
+    pub(super) fn times_of_tables(&self) -> impl Iterator<Item = f64> {
+        self.each.iter().flat_map(|source| match source {
+            Source::Table(table) => table.times().iter().copied(),
+            Source::Zero | Source::Function(_) => [].iter().copied(),
+        })
+    }
+
     #[inline(always)]
     pub(super) fn values<R: Real>(&self, t: R) -> [R; MAX_INPUTS] {
         let mut values = [t.like(0.0); MAX_INPUTS];

@@ -63,6 +63,11 @@ impl Table {
         })
     }
 
+    /// The times of the values.
+    pub(super) fn times(&self) -> &[f64] {
+        &self.times
+    }
+
     /// The value at a time; at a time of the table, exactly the given value.
     pub(super) fn at(&self, t: f64) -> f64 {
         if t.is_nan() {

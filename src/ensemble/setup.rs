@@ -6,7 +6,7 @@ use super::members::{ManyModels, Members, OneModel, some_starts};
 use super::plan::{Plan, WIDTH, bad_starts, start_of};
 use super::results::{Results, lock, summed, unlock};
 use crate::error::RunErrorKind;
-use crate::length::{Declared, FixedLength, Length};
+use crate::length::{Declared, FixedLength, Length, breaks_of};
 use crate::motion::{Node, default_step};
 use crate::progress::Progress;
 use crate::simulation::mesh::Mesh;
@@ -87,7 +87,7 @@ where
 {
     /// An ensemble of runs of one model from many starts.
     pub fn new(model: &'m M) -> Self {
-        Self::with(OneModel(model))
+        Self::with(OneModel(model), breaks_of([model]))
     }
 }
 
@@ -115,12 +115,12 @@ where
     /// # }
     /// ```
     pub fn of_models(models: &'m [M]) -> Self {
-        Self::with(ManyModels(models))
+        Self::with(ManyModels(models), breaks_of(models))
     }
 }
 
 impl<M, const N: usize, K, L: Length<N>> Ensemble<'_, M, N, K, L> {
-    fn with(models: K) -> Self {
+    fn with(models: K, breaks: Vec<f64>) -> Self {
         Self {
             events: Watching::NOTHING,
             of: PhantomData,
@@ -128,7 +128,7 @@ impl<M, const N: usize, K, L: Length<N>> Ensemble<'_, M, N, K, L> {
             element: Element::from(Mixed::<4>),
             step: None,
             control: Control::default(),
-            breaks: Vec::new(),
+            breaks,
             at_kinks: false,
             progress: false,
         }

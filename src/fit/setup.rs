@@ -2,6 +2,7 @@
 
 use super::data::{Column, Measured};
 use super::error::FitError;
+use crate::length::breaks_of;
 use crate::simulation::Simulation;
 use std::ops::{Bound, RangeBounds};
 use tfe_runtime::{Element, Model, State};
@@ -82,7 +83,7 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
             parameters: Vec::new(),
             bounds: Vec::new(),
             measured: Vec::new(),
-            breaks: Vec::new(),
+            breaks: breaks_of([model]),
             progress: false,
         }
     }
@@ -169,8 +170,7 @@ impl<'m, M: Model<N>, const N: usize> Fit<'m, M, N> {
         self
     }
 
-    /// Makes elements end at a time, as [`Simulation::break_at`] does: where an input jumps, or at the times of its
-    /// table.
+    /// Makes elements end at a time, as [`Simulation::break_at`] does: where an input that is given as a function jumps.
     #[must_use]
     pub fn break_at(mut self, time: f64) -> Self {
         self.breaks.push(time);

@@ -6,7 +6,7 @@ use super::kind::{Chosen, Simulated};
 use super::mesh::Grid;
 use super::resolution::Again;
 use crate::error::RunErrorKind;
-use crate::length::{Declared, FixedLength, Length};
+use crate::length::{Declared, FixedLength, Length, breaks_of};
 use crate::motion::{Motion, Warning};
 use crate::sensitivity::Loss;
 use std::ops::Range;
@@ -134,7 +134,7 @@ impl<'m, M, const N: usize, L: Length<N>> Simulation<'m, M, N, L> {
             control: Control::default(),
             record_every: 1,
             impulses: Vec::new(),
-            breaks: Vec::new(),
+            breaks: breaks_of([model]),
             events: Watching::NOTHING,
             at_kinks: None,
             progress: false,

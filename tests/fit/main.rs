@@ -502,7 +502,6 @@ fn models_with_inputs_are_fitted() {
     };
     for (true_model, first) in [(held(&truth), held(&guess)), (waves(&truth), waves(&guess))] {
         let run = Simulation::new(&true_model).step(0.1);
-        let run = knots.iter().fold(run, |run, knot| run.break_at(*knot));
         let run = times.iter().fold(run, |run, t| run.break_at(*t));
         let motion = run.run(start, 0.0..4.0).expect("a run");
         let measured: Vec<f64> = times
@@ -514,7 +513,6 @@ fn models_with_inputs_are_fitted() {
             .step(0.1)
             .parameters(["strength", "c"])
             .output("angle", &times, &measured);
-        let fit = knots.iter().fold(fit, |fit, knot| fit.break_at(*knot));
         let fit = fit.solve().expect("a fit");
         let value = |name| fit.value(name).expect("named");
         assert!((value("strength") - 1.7).abs() < 1e-9, "{fit}");

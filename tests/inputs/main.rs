@@ -344,6 +344,15 @@ fn elements_end_at_the_times_of_a_table() {
                 .iter()
                 .all(|time| motion.states().iter().any(|node| node.t == *time))
         );
+        let driven = Driven::new(&free);
+        let driven = driven.table("u", &times, &values, way).expect("a table");
+        let same = Simulation::new(&driven).step(0.25).run(start, 0.0..3.0);
+        assert_eq!(same.unwrap().states(), motion.states());
+        let drivens = [driven, Driven::new(&free)];
+        let ends = Ensemble::of_models(&drivens).step(0.25);
+        let ends = ends.run(&[start], 0.0..3.0).unwrap();
+        let end = ends.iter().next().unwrap().as_ref().unwrap();
+        assert!((end.q[0] - motion.last().q[0]).abs() <= 1e-15);
         (motion.last().v[0], motion.last().q[0])
     };
     // ∫u and ∫(3 − t)u dt by hand.

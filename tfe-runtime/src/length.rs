@@ -22,8 +22,16 @@ pub struct RunTimeLength;
 pub trait Declared<const N: usize> {
     /// [`FixedLength`] or [`RunTimeLength`].
     type Length;
+
+    /// Passes to `report` the times at which the kernels have kinks or jumps, such as those of the tables of given inputs:
+    /// elements should end there. By default there are none.
+    fn breaks<F: FnMut(f64)>(&self, _report: &mut F) {}
 }
 
 impl<M: Model<N>, const N: usize> Declared<N> for M {
     type Length = FixedLength;
+
+    fn breaks<F: FnMut(f64)>(&self, report: &mut F) {
+        self.breaks_of_inputs(report);
+    }
 }

@@ -308,6 +308,10 @@ pub trait Model<const N: usize> {
         true
     }
 
+    /// Passes to `report` the times at which [given](Self::GIVEN_INPUTS) inputs have kinks or jumps: elements should end
+    /// there.
+    fn breaks_of_inputs<F: FnMut(f64)>(&self, _report: &mut F) {}
+
     /// Passes to `values` the bits of everything that kernels read besides the [parameters](Self::parameters), in the
     /// order of the struct: fields that are lengths, and the elements of vectors of numbers, with their number. Models
     /// that differ in these values cannot be stepped side by side, nor can a suspended run be resumed with a model that
