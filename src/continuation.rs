@@ -307,7 +307,7 @@ impl<'m, M: Model<N> + Clone, const N: usize> Continuation<'m, M, N> {
         branch.parameter = name;
         let mut model = self.model.clone();
         let path = self.path(*field(&mut model))?;
-        let (orbit, iterate, _) = self.orbit.solved()?;
+        let (orbit, iterate, ..) = self.orbit.solved()?;
         let problem = Continued {
             width: (path.range.end - path.range.start).abs(),
             row: Row::Parameter(*field(&mut model)),

@@ -11,7 +11,7 @@ use super::error::AssemblyError;
 use super::newton::{Assembly, Iterate, Problem};
 use super::warning::MeshWarning;
 use crate::numbers::{larger, raise, smaller};
-use tfe_runtime::{Element, State};
+use tfe_runtime::Element;
 
 /// Below this pivot ratio a solution is checked: it may be a thousand times as large as the prescribed values.
 const DOUBTFUL: f64 = 1e-3;
@@ -23,10 +23,6 @@ const ROUNDINGS: f64 = 1e-6;
 /// The largest relative change by one correction on a mesh of half the element length. A solution that is due to the
 /// discretisation error grows by the factor by which the error decreases, at least four.
 const LEFT: f64 = 0.5;
-
-/// The largest change by that correction without a warning, relative to the extent of the motion; runs have the same
-/// limit (T-121).
-const FARTHEST: f64 = 0.03;
 
 /// The least extent, relative to the values themselves: that of a motion at rest is its rounding errors.
 const MIN: f64 = 1e-6;
@@ -48,11 +44,43 @@ impl Chain {
     }
 }
 
-#[cfg(feature = "sparse")]
-impl Size {
-    /// Whether the correction on a mesh of half the element length confirms the solution.
-    pub(crate) fn leaves(self) -> bool {
-        self.whole() <= LEFT
+/// The size of one correction by Newton's method on elements of half the length.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HalvedCorrection {
+    /// Relative to the whole solution.
+    whole: f64,
+    /// Relative to the extent of the motion.
+    part: f64,
+}
+
+impl HalvedCorrection {
+    /// The equations are singular on elements of half the length.
+    pub(crate) const SINGULAR: Self = Self {
+        whole: f64::INFINITY,
+        part: f64::INFINITY,
+    };
+
+    /// A correction of nodes, given by their momenta, coordinates and corrections, and of global unknowns, given relative
+    /// to their scales.
+    pub(crate) fn of(
+        size: Size,
+        nodes: &[(&[f64], &[f64], &[f64])],
+        globals: impl IntoIterator<Item = f64>,
+    ) -> Self {
+        Self {
+            whole: size.whole(),
+            part: part_of_extent(nodes, globals),
+        }
+    }
+
+    /// Whether the solution is confirmed.
+    pub(crate) fn confirms(self) -> bool {
+        self.whole <= LEFT
+    }
+
+    /// The warnings for a solution on this number of elements.
+    pub(crate) fn doubts(self, elements: usize) -> Vec<MeshWarning> {
+        MeshWarning::unless_resolved(elements, self.part)
     }
 }
 
@@ -67,20 +95,13 @@ impl<const N: usize> Assembly<N> {
         self.chain().explained(error)
     }
 
-    /// Refuses a solution without global unknowns that one Newton correction on a mesh of half the element length
-    /// (`fine`) does not confirm. `curve` is the solution.
-    pub(crate) fn check_resolved<P: Problem<N>>(
+    /// Refuses a solution that the correction on elements of half the length does not confirm. If there is no
+    /// correction, the solution is accepted.
+    pub(crate) fn check_resolved(
         &self,
-        element: Element,
-        (fine, elements): (&P, usize),
-        curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
+        halved: Option<HalvedCorrection>,
     ) -> Result<(), AssemblyError> {
-        let unknowns = (Vec::new(), 0);
-        let size = |halves: &Self, iterate: &Iterate<N>| halves.size(fine, iterate).whole();
-        let change = Self::corrected(element, (fine, elements), unknowns, curve, size)?;
-        // If the check itself fails, the solution is accepted.
-        let is_left = change.is_none_or(|change| change <= LEFT);
-        if is_left {
+        if halved.is_none_or(HalvedCorrection::confirms) {
             return Ok(());
         }
         Err(AssemblyError::Singular {
@@ -88,75 +109,63 @@ impl<const N: usize> Assembly<N> {
         })
     }
 
-    /// The warnings for a solution, given as a curve with its global unknowns, by one Newton correction on a mesh of half
-    /// the element length (`fine`). If there is no correction, there are none.
-    pub(crate) fn doubts<P: Problem<N>>(
-        element: Element,
-        (fine, elements): (&P, usize),
-        unknowns: (Vec<f64>, usize),
-        curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
-    ) -> Vec<MeshWarning> {
-        let size = |halves: &Self, iterate: &Iterate<N>| halves.part_of_extent(fine, iterate);
-        let change = Self::corrected(element, (fine, elements), unknowns, curve, size);
-        let Ok(Some(change)) = change else {
-            return Vec::new();
-        };
-        let warning = MeshWarning::Unresolved {
-            elements: elements / 2,
-            change,
-        };
-        // A NaN is no solution, of which the iteration has told.
-        if change > FARTHEST {
-            vec![warning]
-        } else {
-            Vec::new()
-        }
-    }
-
-    /// The size of one Newton correction on a mesh of half the element length (`fine`), for a solution given as a curve
-    /// with its global unknowns: infinite where the equations are singular, `None` if there is no correction.
-    fn corrected<P: Problem<N>>(
+    /// The correction of a solution on a mesh of half the element length (`fine`), for a solution given as a curve with
+    /// its global unknowns; `None` if there is none.
+    pub(crate) fn halved_correction<P: Problem<N>>(
         element: Element,
         (fine, elements): (&P, usize),
         (globals, dense): (Vec<f64>, usize),
         curve: impl FnMut(f64) -> ([f64; N], [f64; N]),
-        size: impl FnOnce(&Self, &Iterate<N>) -> f64,
-    ) -> Result<Option<f64>, AssemblyError> {
+    ) -> Result<Option<HalvedCorrection>, AssemblyError> {
         let mut halves = Self::new::<P::Model>(element, elements, globals.len(), dense)?;
         let Ok(iterate) = halves.along(fine, curve, globals) else {
             return Ok(None);
         };
         Ok(match halves.linearise(fine, &iterate) {
-            Ok(()) => Some(size(&halves, &iterate)),
-            Err(AssemblyError::Singular { .. }) => Some(f64::INFINITY),
+            Ok(()) => Some(halves.correction(fine, &iterate)),
+            Err(AssemblyError::Singular { .. }) => Some(HalvedCorrection::SINGULAR),
             Err(_) => None,
         })
     }
 
-    /// The size of the last correction: of coordinates and momenta relative to their extents, of global unknowns relative
-    /// to their scales.
-    fn part_of_extent<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> f64 {
-        let kinds: [fn(&State<N>) -> &[f64; N]; 2] = [|state| &state.p, |state| &state.q];
-        let mut most = 0.0;
-        for (kind, of) in kinds.into_iter().enumerate() {
-            let (mut extent, mut correction) = (0.0, 0.0);
-            for a in 0..N {
-                let values = || iterate.nodes.iter().map(|node| of(node)[a]);
-                let high = values().fold(f64::NEG_INFINITY, larger);
-                let low = values().fold(f64::INFINITY, smaller);
-                raise(&mut extent, high - low);
-                raise(&mut extent, MIN * larger(high.abs(), low.abs()));
-                for e in 0..iterate.nodes.len() {
-                    raise(&mut correction, self.chain().node(e)[kind * N + a].abs());
-                }
-            }
-            if extent > 0.0 {
-                raise(&mut most, correction / extent);
-            }
-        }
-        for (k, correction) in self.chain().globals().iter().enumerate() {
-            raise(&mut most, (correction / problem.scale(k)).abs());
-        }
-        most
+    /// The size of the last correction.
+    fn correction<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> HalvedCorrection {
+        let nodes = iterate.nodes.iter().enumerate();
+        let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], self.chain().node(e)));
+        let nodes: Vec<_> = nodes.collect();
+        let globals = self.chain().globals().iter().enumerate();
+        let globals = globals.map(|(k, correction)| correction / problem.scale(k));
+        HalvedCorrection::of(self.size(problem, iterate), &nodes, globals)
     }
+}
+
+/// The size of a correction of nodes, given by their momenta, coordinates and corrections: of coordinates and momenta
+/// relative to their extents; that of global unknowns is given relative to their scales.
+pub(crate) fn part_of_extent(
+    nodes: &[(&[f64], &[f64], &[f64])],
+    globals: impl IntoIterator<Item = f64>,
+) -> f64 {
+    let mut most = 0.0;
+    for kind in 0..2 {
+        let (mut extent, mut largest) = (0.0, 0.0);
+        let values = nodes.iter().map(|(p, q, _)| [*p, *q][kind]);
+        let n = values.clone().next().map_or(0, <[f64]>::len);
+        for a in 0..n {
+            let values = || values.clone().map(|node| node[a]);
+            let high = values().fold(f64::NEG_INFINITY, larger);
+            let low = values().fold(f64::INFINITY, smaller);
+            raise(&mut extent, high - low);
+            raise(&mut extent, MIN * larger(high.abs(), low.abs()));
+            for (_, _, correction) in nodes {
+                raise(&mut largest, correction[kind * n + a].abs());
+            }
+        }
+        if extent > 0.0 {
+            raise(&mut most, largest / extent);
+        }
+    }
+    for correction in globals {
+        raise(&mut most, correction.abs());
+    }
+    most
 }

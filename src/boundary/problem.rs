@@ -325,10 +325,12 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         let motion = solution.motion();
         let along = |t: f64| along_motion(self.model, &motion, t);
         let fine = (&halves, 2 * self.elements);
-        if (1..2 * N).contains(&at_end) && assembly.is_doubtful() {
-            assembly.check_resolved(self.element, fine, along)?;
+        let may_be_singular = (1..2 * N).contains(&at_end);
+        let halved = Assembly::halved_correction(self.element, fine, (Vec::new(), 0), along)?;
+        if may_be_singular && assembly.is_doubtful() {
+            assembly.check_resolved(halved)?;
         }
-        let warnings = Assembly::doubts(self.element, fine, (Vec::new(), 0), along);
+        let warnings = halved.map_or(Vec::new(), |halved| halved.doubts(self.elements));
         Ok(BoundaryMotion { solution, warnings })
     }
 

@@ -125,5 +125,7 @@ fn orbit_of<M: family::Model>(
     let at = (&shooting.nodes[..], shooting.period);
     let floquet = shooting.floquet_of(&shooting.transitions, at, shooting.model)?;
     let (trivial, unfolding) = (shooting.trivial(), shooting.unfolding());
-    Ok(Orbit::of_solution(shooting, floquet, trivial, unfolding))
+    let warnings = shooting.doubts();
+    let orbit = Orbit::of_solution(shooting, floquet, trivial, unfolding);
+    Ok(orbit.with_warnings(warnings))
 }

@@ -135,8 +135,8 @@ impl<'m, M, const N: usize, L: Closed<M, N>> Orbit<'m, M, N, L> {
     }
 
     /// What makes the orbit doubtful: whether elements of half the length change it, by one correction of Newton's
-    /// method, and whether nodes next to each other lie on both sides of a kink or a jump of a force. Orbits of a [branch](crate::Branch) have [warnings of their own](crate::Branch::warnings), and those of
-    /// models of run-time length have none.
+    /// method, and, for models of fixed size, whether nodes next to each other lie on both sides of a kink or a jump of a
+    /// force. Orbits of a [branch](crate::Branch) have [warnings of their own](crate::Branch::warnings).
     pub fn warnings(&self) -> &[MeshWarning] {
         &self.warnings
     }

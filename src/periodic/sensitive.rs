@@ -44,9 +44,9 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// # Errors
     /// As from [`solve`](Self::solve).
     pub fn solve_sensitive(&self) -> Result<SensitiveOrbit<Orbit<'m, M, N>, N>, OrbitError> {
-        let (problem, iterate, assembly) = self.solved()?;
+        let (problem, iterate, assembly, halved) = self.solved()?;
         let element = self.method().0;
-        let warnings = self.doubts(&problem, &iterate);
+        let warnings = self.doubts((&problem, &iterate), halved);
         let orbit = Orbit::new(element, &problem, iterate.clone(), &assembly)?;
         let orbit = orbit.with_warnings(warnings);
         let indices: Vec<usize> = (0..self.model.parameters()).collect();

@@ -7,7 +7,8 @@ use super::phase::{Period, Phase};
 use super::problem::{Global, Periodic, inertia_of};
 use super::rest::{Extent, is_at_rest, may_rest};
 use crate::assembly::{
-    Assembly, AssemblyError, Control, Curve, Iterate, Mesh, MeshWarning, crossed_kinks,
+    Assembly, AssemblyError, Control, Curve, HalvedCorrection, Iterate, Mesh, MeshWarning,
+    crossed_kinks,
 };
 use crate::length::{Declared, FixedLength, Length};
 use crate::motion::Motion;
@@ -273,27 +274,38 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
     /// [`Constraints`](OrbitError::Constraints) or [`Multipliers`](OrbitError::Multipliers) if the orbit is found, but not
     /// its multipliers.
     pub fn solve(&self) -> Result<Orbit<'m, M, N>, OrbitError> {
-        let (problem, iterate, assembly) = self.solved()?;
-        let warnings = self.doubts(&problem, &iterate);
+        let (problem, iterate, assembly, halved) = self.solved()?;
+        let warnings = self.doubts((&problem, &iterate), halved);
         let orbit = Orbit::new(self.element, &problem, iterate, &assembly)?;
         Ok(orbit.with_warnings(warnings))
     }
 
-    /// The warnings for an orbit.
+    /// The warnings for an orbit; `known` is its correction on elements of half the length, if that was made.
     pub(super) fn doubts(
         &self,
-        problem: &Periodic<'_, M, N>,
-        iterate: &Iterate<N>,
+        (problem, iterate): (&Periodic<'_, M, N>, &Iterate<N>),
+        known: Option<HalvedCorrection>,
     ) -> Vec<MeshWarning> {
-        let motion = self.motion_of(problem, iterate);
-        let along = |t: f64| along_motion(self.model, &motion, t);
-        let fine = (&problem.halved(), 2 * self.elements);
-        let unknowns = (iterate.globals.clone(), problem.dense());
-        let mut warnings = Assembly::doubts(self.element, fine, unknowns, along);
+        // The element is valid: there is a solution with it.
+        let halved = known.or_else(|| self.halved_correction(problem, iterate).ok().flatten());
+        let mut warnings = halved.map_or(Vec::new(), |halved| halved.doubts(self.elements));
         let times = problem.mesh.times(problem.start, problem.period);
         let nodes = times.zip(iterate.nodes.iter().copied());
         warnings.extend(crossed_kinks(self.model, nodes));
         warnings
+    }
+
+    /// The correction of an orbit on elements of half the length, if there is one.
+    fn halved_correction(
+        &self,
+        problem: &Periodic<'_, M, N>,
+        iterate: &Iterate<N>,
+    ) -> Result<Option<HalvedCorrection>, AssemblyError> {
+        let motion = self.motion_of(problem, iterate);
+        let along = |t: f64| along_motion(self.model, &motion, t);
+        let fine = (&problem.halved(), 2 * self.elements);
+        let unknowns = (iterate.globals.clone(), problem.dense());
+        Assembly::halved_correction(self.element, fine, unknowns, along)
     }
 
     /// Solves the equations.
@@ -352,9 +364,13 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
             .map_err(AssemblyError::Legendre)?;
         let guess = extent_of(&iterate);
         let mut solved = assembly.solve(&mut problem, &mut iterate, self.control);
+        let mut halved = None;
         if !autonomous {
-            solved = (solved.map_err(|error| assembly.explained(error)))
-                .and_then(|()| self.check_resolved(&problem, &iterate, &assembly));
+            solved = (solved.map_err(|error| assembly.explained(error))).and_then(|()| {
+                halved = self.doubtful_correction(&problem, &iterate, &assembly)?;
+                // At resonance, elements of half the length do not confirm the orbit.
+                assembly.check_resolved(halved)
+            });
         }
         let solved = (solved.map_err(OrbitError::from)).and_then(|()| problem.check());
         // If a phase condition is given, an equilibrium is not accepted.
@@ -368,23 +384,20 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         }
         solved?;
         problem.check_repeats(&iterate)?;
-        Ok((problem, iterate, assembly))
+        Ok((problem, iterate, assembly, halved))
     }
 
-    /// Refuses a forced orbit that elements of half the length do not confirm, as at resonance.
-    fn check_resolved(
+    /// The correction on elements of half the length, if the equations are close to singular.
+    fn doubtful_correction(
         &self,
         problem: &Periodic<'_, M, N>,
         iterate: &Iterate<N>,
         assembly: &Assembly<N>,
-    ) -> Result<(), AssemblyError> {
-        if !assembly.is_doubtful() {
-            return Ok(());
+    ) -> Result<Option<HalvedCorrection>, AssemblyError> {
+        match assembly.is_doubtful() {
+            true => self.halved_correction(problem, iterate),
+            false => Ok(None),
         }
-        let halves = problem.halved();
-        let motion = self.motion_of(problem, iterate);
-        let along = |t: f64| along_motion(self.model, &motion, t);
-        assembly.check_resolved(self.element, (&halves, 2 * self.elements), along)
     }
 
     /// The motion of an iterate, with the polynomials of its elements.
@@ -477,8 +490,14 @@ fn extent_of<const N: usize>(iterate: &Iterate<N>) -> Extent {
     Extent::of(iterate.nodes.iter().map(|node| &node.q[..]))
 }
 
-/// The equations of an orbit, their solution, and the workspace.
-pub(crate) type Solved<'m, M, const N: usize> = (Periodic<'m, M, N>, Iterate<N>, Assembly<N>);
+/// The equations of an orbit, their solution, the workspace, and the correction on elements of half the length, if that
+/// was made.
+pub(crate) type Solved<'m, M, const N: usize> = (
+    Periodic<'m, M, N>,
+    Iterate<N>,
+    Assembly<N>,
+    Option<HalvedCorrection>,
+);
 
 /// Coordinates and velocities of a motion; beyond its end, the last ones.
 pub(crate) fn along_motion<M: Model<N>, const N: usize>(

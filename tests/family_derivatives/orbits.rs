@@ -571,3 +571,31 @@ fn what_makes_no_sense_is_told() {
     assert!(rest.unfolding().is_none() && rest.trivial().is_empty());
     assert!(matches!(rest.verdict(), Verdict::Neutral { .. }));
 }
+
+/// Elements that are too long close another motion: the orbit has a warning, as those of models of fixed size.
+#[test]
+fn orbits_that_the_elements_do_not_resolve_are_told() {
+    let driven = Driven {
+        n: 2,
+        b: 0.0,
+        c: 0.2,
+        f: 0.3,
+        omega: 1.4,
+    };
+    let of = |periods: f64, elements: usize| {
+        let orbit = PeriodicOrbit::of(&driven).elements(elements);
+        orbit.period(periods * TAU / driven.omega).solve()
+    };
+    let near = of(1.0, 40).expect("an orbit");
+    assert!(near.warnings().is_empty(), "{near}");
+    let far = of(20.0, 20).expect("an orbit");
+    let off = (far.start().q[1] - near.start().q[1]).abs();
+    assert!(off > 0.03 && far.warnings().len() == 1, "{off} {far}");
+    assert!(far.to_string().contains("20 elements do not resolve"));
+    // An unknown period, with an unfolding force.
+    let chain = Chain { n: 2, b: 1.0 };
+    let swing = PeriodicOrbit::of(&chain).unknown_period(5.0);
+    let swing = swing.guess_from(chain.state(vec![1.0, 1.0], vec![0.0, 0.0]));
+    let swing = swing.solve().expect("an orbit");
+    assert!(swing.warnings().is_empty(), "{swing}");
+}

@@ -5,7 +5,9 @@ use super::super::kind::Chained;
 use super::super::orbit::sort;
 use super::super::phase::Phase;
 use super::super::problem::{Global, NEIGHBOURED, check, inertia_of};
-use crate::assembly::{AssemblyError, Chain, Control, Convergence, Mesh, Size, sizes};
+use crate::assembly::{
+    AssemblyError, Chain, Control, Convergence, HalvedCorrection, Mesh, MeshWarning, Size, sizes,
+};
 use crate::constraints::allowed::{self, basis_of};
 use crate::periodic_schur::{self, Multiplier};
 use nalgebra::DMatrix;
@@ -27,6 +29,8 @@ pub struct Shooting<'m, M> {
     pub(super) phase: Option<Phase>,
     pub(super) energy: Option<f64>,
     pub(super) nodes: Vec<FamilyState>,
+    /// The correction on elements of half the length, once it is made.
+    halved: Option<HalvedCorrection>,
     pub(super) transitions: Vec<DMatrix<f64>>,
     /// The flow ẏ at the ends of the elements, in the order (p, q), if there are too few nodes for differences.
     flows: Vec<Vec<f64>>,
@@ -54,6 +58,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             phase: None,
             energy: None,
             nodes,
+            halved: None,
             transitions: Vec::new(),
             flows: Vec::new(),
             statistics: Statistics::NONE,
@@ -113,7 +118,6 @@ impl<'m, M: family::Model> Shooting<'m, M> {
 
     /// Newton's method with step halving.
     pub(super) fn solve(&mut self, control: Control) -> Result<(), OrbitError> {
-        let n = self.model.len();
         if self.globals.contains(&Global::Unfolding) {
             let (mut momenta, mut velocities) = (Vec::new(), Vec::new());
             for node in &self.nodes {
@@ -125,8 +129,7 @@ impl<'m, M: family::Model> Shooting<'m, M> {
             }
             self.inertia = inertia_of(&momenta, &velocities);
         }
-        let dense = usize::from(self.phase == Some(Phase::Orthogonal));
-        let mut chain = Chain::new(2 * n, self.globals.len(), self.mesh.elements(), dense);
+        let mut chain = self.chain();
         self.linearise(&mut chain)?;
         let mut convergence = Convergence::new(control, self.size(&chain));
         loop {
@@ -167,10 +170,27 @@ impl<'m, M: family::Model> Shooting<'m, M> {
     }
 
     /// Refuses a forced orbit that elements of half the length do not confirm, as for models of fixed size.
-    fn check_resolved(&self, chain: &Chain) -> Result<(), OrbitError> {
+    fn check_resolved(&mut self, chain: &Chain) -> Result<(), OrbitError> {
         if !(Self::is_forced() && chain.is_doubtful()) {
             return Ok(());
         }
+        self.halved = self.halved_correction();
+        // If the check itself fails, the orbit is accepted.
+        if self.halved.is_none_or(HalvedCorrection::confirms) {
+            return Ok(());
+        }
+        let iterations = self.corrections();
+        Err(AssemblyError::Singular { iterations }.into())
+    }
+
+    /// What makes the orbit doubtful.
+    pub(super) fn doubts(&self) -> Vec<MeshWarning> {
+        let halved = self.halved.or_else(|| self.halved_correction());
+        halved.map_or(Vec::new(), |halved| halved.doubts(self.mesh.elements()))
+    }
+
+    /// The correction on elements of half the length, if there is one.
+    fn halved_correction(&self) -> Option<HalvedCorrection> {
         let (mesh, motion) = (self.mesh.halved(), self.motion());
         let last = motion.last().t;
         let inside = mesh.times(self.start, self.period).enumerate();
@@ -180,19 +200,35 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         });
         let nodes: Vec<FamilyState> = nodes.collect();
         let span = (self.start, self.period);
-        let mut halves = Self::new(self.model, self.element, mesh, span, nodes);
-        let mut other = Chain::new(2 * self.model.len(), 0, halves.mesh.elements(), 0);
-        let is_left = match halves.linearise(&mut other) {
-            Ok(()) => halves.size(&other).leaves(),
-            Err(OrbitError::Assembly(AssemblyError::Singular { .. })) => false,
-            // If the check itself fails, the orbit is accepted.
-            Err(_) => true,
+        let mut halves = Self {
+            unfolding: self.unfolding,
+            inertia: self.inertia,
+            globals: self.globals.clone(),
+            phase: self.phase,
+            energy: self.energy,
+            ..Self::new(self.model, self.element, mesh, span, nodes)
         };
-        if is_left {
-            return Ok(());
+        let mut chain = halves.chain();
+        match halves.linearise(&mut chain) {
+            Ok(()) => Some(halves.correction(&chain)),
+            Err(OrbitError::Assembly(AssemblyError::Singular { .. })) => {
+                Some(HalvedCorrection::SINGULAR)
+            }
+            Err(_) => None,
         }
-        let iterations = self.corrections();
-        Err(AssemblyError::Singular { iterations }.into())
+    }
+
+    /// The size of the correction in a chain.
+    fn correction(&self, chain: &Chain) -> HalvedCorrection {
+        let nodes: Vec<_> = self.corrected_nodes(chain).collect();
+        HalvedCorrection::of(self.size(chain), &nodes, self.corrected_globals(chain))
+    }
+
+    /// The chain of the linearised equations.
+    fn chain(&self) -> Chain {
+        let dense = usize::from(self.phase == Some(Phase::Orthogonal));
+        let (size, globals) = (2 * self.model.len(), self.globals.len());
+        Chain::new(size, globals, self.mesh.elements(), dense)
     }
 
     /// Checks that a solution is an orbit.
@@ -356,12 +392,20 @@ impl<'m, M: family::Model> Shooting<'m, M> {
 
     /// The size of the correction relative to the iterate, as for models of fixed size.
     fn size(&self, chain: &Chain) -> Size {
-        let nodes = self.nodes.iter().enumerate();
-        let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)));
-        let globals = self.globals.iter().zip(chain.globals());
-        let globals = globals
-            .map(|(global, correction)| correction / global.scale(self.period, self.inertia));
+        let (nodes, globals) = (self.corrected_nodes(chain), self.corrected_globals(chain));
         sizes(nodes, chain.matrices(), globals)
+    }
+
+    /// Momenta, coordinates and corrections of the nodes.
+    fn corrected_nodes<'a>(&'a self, chain: &'a Chain) -> impl Iterator<Item = Corrected<'a>> {
+        let nodes = self.nodes.iter().enumerate();
+        nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)))
+    }
+
+    /// The corrections of the global unknowns relative to their scales.
+    fn corrected_globals<'a>(&'a self, chain: &'a Chain) -> impl Iterator<Item = f64> + 'a {
+        let globals = self.globals.iter().zip(chain.globals());
+        globals.map(|(global, correction)| correction / global.scale(self.period, self.inertia))
     }
 
     /// Adds a fraction of the correction to the iterate.
@@ -382,6 +426,9 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         }
     }
 }
+
+/// Momenta, coordinates and correction of a node.
+type Corrected<'a> = (&'a [f64], &'a [f64], &'a [f64]);
 
 /// The error of an element that failed.
 pub(super) fn step_failed(
