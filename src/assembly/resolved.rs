@@ -10,7 +10,7 @@ use super::convergence::Size;
 use super::error::AssemblyError;
 use super::newton::{Assembly, Iterate, Problem};
 use super::warning::MeshWarning;
-use crate::numbers::{larger, raise, smaller};
+use crate::numbers::{larger, largest, raise, smaller};
 use tfe_runtime::Element;
 
 /// Below this pivot ratio a solution is checked: it may be a thousand times as large as the prescribed values.
@@ -60,16 +60,16 @@ impl HalvedCorrection {
         part: f64::INFINITY,
     };
 
-    /// A correction of nodes, given by their momenta, coordinates and corrections, and of global unknowns, given relative
-    /// to their scales.
-    pub(crate) fn of(
+    /// Corrections of nodes, and of global unknowns relative to their scales, with their size; see [`part_of_extent`].
+    pub(crate) fn of<'a>(
         size: Size,
-        nodes: &[(&[f64], &[f64], &[f64])],
+        nodes: &[[&[f64]; 2]],
+        corrections: impl IntoIterator<Item = &'a [f64]>,
         globals: impl IntoIterator<Item = f64>,
     ) -> Self {
         Self {
             whole: size.whole(),
-            part: part_of_extent(nodes, globals),
+            part: part_of_extent(nodes, corrections, globals),
         }
     }
 
@@ -130,42 +130,47 @@ impl<const N: usize> Assembly<N> {
 
     /// The size of the last correction.
     fn correction<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> HalvedCorrection {
-        let nodes = iterate.nodes.iter().enumerate();
-        let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], self.chain().node(e)));
+        let nodes = iterate.nodes.iter().map(|node| [&node.p[..], &node.q]);
         let nodes: Vec<_> = nodes.collect();
+        let corrections = (0..nodes.len()).map(|e| self.chain().node(e));
         let globals = self.chain().globals().iter().enumerate();
         let globals = globals.map(|(k, correction)| correction / problem.scale(k));
-        HalvedCorrection::of(self.size(problem, iterate), &nodes, globals)
+        HalvedCorrection::of(self.size(problem, iterate), &nodes, corrections, globals)
     }
 }
 
-/// The size of a correction of nodes, given by their momenta, coordinates and corrections: of coordinates and momenta
-/// relative to their extents; that of global unknowns is given relative to their scales.
-pub(crate) fn part_of_extent(
-    nodes: &[(&[f64], &[f64], &[f64])],
+/// The size of corrections of nodes, in the order (p, q), relative to the extents of all momenta and of all coordinates
+/// of the nodes [p, q] of a motion, and of global unknowns, which are given relative to their scales.
+pub(crate) fn part_of_extent<'a>(
+    nodes: &[[&[f64]; 2]],
+    corrections: impl IntoIterator<Item = &'a [f64]>,
     globals: impl IntoIterator<Item = f64>,
 ) -> f64 {
     let mut most = 0.0;
-    for kind in 0..2 {
-        let (mut extent, mut largest) = (0.0, 0.0);
-        let values = nodes.iter().map(|(p, q, _)| [*p, *q][kind]);
-        let n = values.clone().next().map_or(0, <[f64]>::len);
-        for a in 0..n {
-            let values = || values.clone().map(|node| node[a]);
-            let high = values().fold(f64::NEG_INFINITY, larger);
-            let low = values().fold(f64::INFINITY, smaller);
-            raise(&mut extent, high - low);
-            raise(&mut extent, MIN * larger(high.abs(), low.abs()));
-            for (_, _, correction) in nodes {
-                raise(&mut largest, correction[kind * n + a].abs());
-            }
-        }
-        if extent > 0.0 {
-            raise(&mut most, largest / extent);
-        }
-    }
     for correction in globals {
         raise(&mut most, correction.abs());
     }
+    let extents = [0, 1].map(|kind| extent(&|| nodes.iter().map(move |node| node[kind])));
+    for correction in corrections {
+        let (of_p, of_q) = correction.split_at(correction.len() / 2);
+        for (part, extent) in [of_p, of_q].into_iter().zip(extents) {
+            if extent > 0.0 {
+                raise(&mut most, largest(part) / extent);
+            }
+        }
+    }
     most
+}
+
+/// The largest difference between two values of the same component, at least [`MIN`] of the values themselves.
+fn extent<'a, I: Iterator<Item = &'a [f64]>>(values: &dyn Fn() -> I) -> f64 {
+    let components = values().next().map_or(0, <[f64]>::len);
+    let mut extent = 0.0;
+    for a in 0..components {
+        let high = values().fold(f64::NEG_INFINITY, |high, value| larger(high, value[a]));
+        let low = values().fold(f64::INFINITY, |low, value| smaller(low, value[a]));
+        raise(&mut extent, high - low);
+        raise(&mut extent, MIN * larger(high.abs(), low.abs()));
+    }
+    extent
 }

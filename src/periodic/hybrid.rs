@@ -1,12 +1,14 @@
 //! Periodic orbits of motions with events that change the state, such as impacts and switches (single shooting).
 
+mod orbit;
+
 use super::error::OrbitError;
-use super::orbit::{Verdict, sort, trivial_of};
+use super::orbit::sort;
 use super::phase::Period;
 use super::repeats::{check_repeats, rate};
 use super::rest::{Extent, is_at_rest};
 use super::setup::{PeriodicOrbit, check_advance};
-use crate::assembly::{MeshError, check_tolerance};
+use crate::assembly::{MeshError, MeshWarning, check_tolerance, part_of_extent};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::linearised::Linearised;
@@ -14,8 +16,10 @@ use crate::motion::{Motion, Node, Setting};
 use crate::numbers::{larger, largest, raise};
 use crate::periodic_schur::Multiplier;
 use crate::simulation::{Differentiable, Simulation};
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use tfe_runtime::family::ModelError;
+
+pub use orbit::HybridOrbit;
 
 impl<'m, M, const N: usize, L: Length<N>> PeriodicOrbit<'m, M, N, L> {
     /// A periodic orbit of a simulation with [events](Simulation::on) that change the state (a hybrid system): an
@@ -194,20 +198,12 @@ where
         let mut iterations = 0;
         while iterations < self.max_iterations {
             iterations += 1;
-            let scales = scales(run.motion());
-            let residual = self.residual(&run, &scales);
-            let rate = rate(self.simulation.model(), run.motion().last());
-            let closing = Closing {
-                product: run.product(),
-                rate: is_free.then_some(rate),
-                scales: &scales,
-                period,
-            };
+            let (scales, residual, correction) = self.correction(&run, period)?;
             let Correction {
                 start: change,
                 stretch,
                 gain,
-            } = closing.shortest(&residual)?;
+            } = correction;
             let size = larger(largest(change.as_slice()), stretch.abs() / period);
             let is_done = size <= self.tolerance || (size < ROUNDED && size > 0.5 * last);
             last = size;
@@ -252,6 +248,50 @@ where
             residual,
             iterations,
         })
+    }
+
+    /// The correction of a motion over a period, with the scales and the residual from which it is computed.
+    fn correction(
+        &self,
+        run: &Linearised<N, L>,
+        period: f64,
+    ) -> Result<(Scales, DVector<f64>, Correction), OrbitError> {
+        let scales = scales(run.motion());
+        let residual = self.residual(run, &scales);
+        let is_free = matches!(self.period, Period::Guess(_));
+        let rate = rate(self.simulation.model(), run.motion().last());
+        let closing = Closing {
+            product: run.product(),
+            rate: is_free.then_some(rate),
+            scales: &scales,
+            period,
+        };
+        let correction = closing.shortest(&residual)?;
+        Ok((scales, residual, correction))
+    }
+
+    /// The warnings for an orbit, by a correction of its start and its period with steps of half the length. If there is
+    /// no correction, there are none.
+    fn doubts(&self, start: &L::State, period: f64) -> Vec<MeshWarning> {
+        let fine = Self {
+            elements: 2 * self.elements,
+            ..self.of(self.simulation.clone())
+        };
+        let corrected = fine.run(start, period).and_then(|run| {
+            let (scales, _, correction) = fine.correction(&run, period)?;
+            Ok((run, scales, correction))
+        });
+        let Ok((run, scales, correction)) = corrected else {
+            return Vec::new();
+        };
+        let change = correction.start.iter().enumerate();
+        let change: Vec<f64> = change.map(|(row, part)| part * scales.of(row)).collect();
+        let nodes = run.motion().states().iter();
+        let nodes: Vec<_> = nodes
+            .map(|node| [node.p.as_ref(), node.q.as_ref()])
+            .collect();
+        let part = part_of_extent(&nodes, [&change[..]], [correction.stretch / period]);
+        MeshWarning::unless_resolved(self.elements, part)
     }
 
     /// Refuses an equilibrium if the period is unknown; with a known period it is a valid orbit.
@@ -350,6 +390,7 @@ where
         check_repeats(model, &nodes, period, |a| self.grown(a))?;
         let mut floquet = run.multipliers().map_err(OrbitError::Multipliers)?;
         sort(&mut floquet);
+        let warnings = self.doubts(&nodes[0].1, period);
         let (motion, transitions) = run.into_parts();
         let trivial = self.trivial(&floquet, &motion);
         Ok(HybridOrbit {
@@ -361,6 +402,7 @@ where
             motion,
             transitions,
             iterations,
+            warnings,
         })
     }
 
@@ -515,82 +557,4 @@ pub(super) fn moved<const N: usize, L: Length<N>>(
         L::from_fn(q, |a| old_q[a] + change(n + a)),
         L::from_fn(p, |a| old_p[a] + change(a)),
     )
-}
-
-/// A periodic orbit with events, and its Floquet multipliers; made by [`HybridOrbits::solve`].
-#[derive(Clone, Debug)]
-pub struct HybridOrbit<const N: usize, L: Length<N> = FixedLength> {
-    start: L::State,
-    period: f64,
-    floquet: Vec<Multiplier>,
-    multipliers: Vec<Complex<f64>>,
-    trivial: usize,
-    motion: Motion<N, L>,
-    transitions: Vec<DMatrix<f64>>,
-    iterations: u32,
-}
-
-impl<const N: usize, L: Length<N>> HybridOrbit<N, L> {
-    /// The period T, as given or as found.
-    pub fn period(&self) -> f64 {
-        self.period
-    }
-
-    /// The state at the start of the period.
-    pub fn start(&self) -> L::State {
-        self.start.clone()
-    }
-
-    /// The motion over one period, with its [events](Motion::events) and dense output.
-    pub fn motion(&self) -> &Motion<N, L> {
-        &self.motion
-    }
-
-    /// The transition matrices of the elements, in order and across events: 2N × 2N each, ordered (p, q).
-    pub fn transitions(&self) -> &[DMatrix<f64>] {
-        &self.transitions
-    }
-
-    /// The monodromy matrix, 2N × 2N, ordered (p, q): the derivative of the state after a period with respect to the
-    /// state at its start, including the effect of events on the state and the change of their times. Entries beyond
-    /// 10³⁰⁸ are infinite or NaN.
-    pub fn monodromy(&self) -> DMatrix<f64> {
-        let (_, p) = L::parts(&self.start);
-        let size = 2 * p.as_ref().len();
-        let identity = DMatrix::identity(size, size);
-        (self.transitions.iter()).fold(identity, |product, matrix| matrix * product)
-    }
-
-    /// The Floquet multipliers, in order of decreasing modulus; computed from the matrices of the elements, not from
-    /// their product.
-    pub fn multipliers(&self) -> &[Complex<f64>] {
-        &self.multipliers
-    }
-
-    /// The same as logarithm of the modulus and argument.
-    pub(super) fn floquet(&self) -> &[Multiplier] {
-        &self.floquet
-    }
-
-    /// The index of the trivial multiplier, which is one because the model does not depend on time. Empty for a forced
-    /// model, for an equilibrium, and if the period was given and no multiplier is within 10⁻⁴ of one.
-    pub fn trivial(&self) -> Vec<usize> {
-        trivial_of(&self.floquet, self.trivial)
-    }
-
-    /// Whether the orbit is not unstable, according to [`verdict`](Self::verdict), so that neighbouring motions stay
-    /// near.
-    pub fn is_stable(&self) -> bool {
-        !matches!(self.verdict(), Verdict::Unstable { .. })
-    }
-
-    /// The stability of the orbit, from all multipliers except the trivial one, with its margin.
-    pub fn verdict(&self) -> Verdict {
-        Verdict::of(&self.floquet, &self.trivial())
-    }
-
-    /// The number of Newton's corrections.
-    pub fn iterations(&self) -> u32 {
-        self.iterations
-    }
 }

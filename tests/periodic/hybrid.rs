@@ -114,3 +114,44 @@ fn orbits_with_impacts_and_constraints_are_those_of_a_minimal_coordinate() {
         }
     }
 }
+
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2 - x^2/2,
+    force(x) = cos(omega*t) - c*dot(x),
+    event(wall) = 10 - x,
+)]
+struct Far {
+    omega: f64,
+    c: f64,
+}
+
+/// Steps that are too long close another motion: the orbit has a warning. The motion is known in closed form.
+#[test]
+fn orbits_that_steps_do_not_resolve_are_told() {
+    let model = Far { omega: 1.4, c: 0.2 };
+    let run = Simulation::new(&model).on("wall", Crossing::Falling, |_| Act::Stop);
+    let of = |periods: f64, elements: usize| {
+        let orbit = PeriodicOrbit::of_simulation(&run).elements(elements);
+        let orbit = orbit.period(periods * TAU / model.omega);
+        orbit.solve().expect("an orbit")
+    };
+    // The real part of e^{iωt}/(1 − ω² + icω) at t = 0.
+    let (real, imaginary) = (1.0 - model.omega.powi(2), model.c * model.omega);
+    let (start, size) = (
+        real / (real * real + imaginary * imaginary),
+        1.0 / real.hypot(imaginary),
+    );
+    let near = of(1.0, 40);
+    assert_eq!(near.warnings(), []);
+    assert!((near.start().q[0] - start).abs() <= 1e-6);
+    let far = of(100.0, 40);
+    let off = (far.start().q[0] - start).abs();
+    assert!(off > 0.1 * size, "{off}");
+    assert_eq!(far.warnings().len(), 1);
+    let told = far.warnings()[0].to_string();
+    assert!(
+        told.starts_with("40 elements do not resolve the motion"),
+        "{told}"
+    );
+}

@@ -220,8 +220,18 @@ impl<'m, M: family::Model> Shooting<'m, M> {
 
     /// The size of the correction in a chain.
     fn correction(&self, chain: &Chain) -> HalvedCorrection {
-        let nodes: Vec<_> = self.corrected_nodes(chain).collect();
-        HalvedCorrection::of(self.size(chain), &nodes, self.corrected_globals(chain))
+        let nodes: Vec<_> = self
+            .nodes
+            .iter()
+            .map(|node| [&node.p[..], &node.q])
+            .collect();
+        let corrections = (0..nodes.len()).map(|e| chain.node(e));
+        HalvedCorrection::of(
+            self.size(chain),
+            &nodes,
+            corrections,
+            self.corrected_globals(chain),
+        )
     }
 
     /// The chain of the linearised equations.
@@ -392,14 +402,9 @@ impl<'m, M: family::Model> Shooting<'m, M> {
 
     /// The size of the correction relative to the iterate, as for models of fixed size.
     fn size(&self, chain: &Chain) -> Size {
-        let (nodes, globals) = (self.corrected_nodes(chain), self.corrected_globals(chain));
-        sizes(nodes, chain.matrices(), globals)
-    }
-
-    /// Momenta, coordinates and corrections of the nodes.
-    fn corrected_nodes<'a>(&'a self, chain: &'a Chain) -> impl Iterator<Item = Corrected<'a>> {
         let nodes = self.nodes.iter().enumerate();
-        nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)))
+        let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)));
+        sizes(nodes, chain.matrices(), self.corrected_globals(chain))
     }
 
     /// The corrections of the global unknowns relative to their scales.
@@ -426,9 +431,6 @@ impl<'m, M: family::Model> Shooting<'m, M> {
         }
     }
 }
-
-/// Momenta, coordinates and correction of a node.
-type Corrected<'a> = (&'a [f64], &'a [f64], &'a [f64]);
 
 /// The error of an element that failed.
 pub(super) fn step_failed(
