@@ -8,6 +8,7 @@ mod dependence;
 mod error;
 mod optimum;
 mod problem;
+mod resolved;
 mod search;
 mod transcription;
 
@@ -90,6 +91,9 @@ pub struct OptimalControl<'m, M, const N: usize> {
     inputs: Vec<(String, Source<'m>)>,
     control: Control,
 }
+
+/// The value of an input, by element, index of the input, and time.
+type InputValue<'c> = dyn Fn(usize, usize, f64) -> f64 + 'c;
 
 /// A function of time.
 type Source<'m> = Box<dyn Fn(f64) -> f64 + 'm>;
@@ -285,24 +289,34 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         let coefficients = degree + 1;
         let sizes = Sizes::new(M::FORM, N, &scheme, M::INPUTS.len(), coefficients);
         let length = self.span.end - self.span.start;
-        let places = (0..self.elements).map(|e| mesh.place(e, self.span.start, length));
-        let places: Vec<_> = places.collect();
-        let block = |place| transcription::element(M::FORM, &scheme, &sizes, place, &running);
-        let problem = Problem {
-            model: &Said::<M, N>(self.model),
-            sizes,
-            blocks: places.iter().map(|place| block(*place)).collect(),
-            end: (!end.is_empty()).then(|| transcription::end(M::FORM, N, self.span.end, &end)),
-            lengths: places.iter().map(|(_, h)| *h).collect(),
-            ends: self.ends(),
+        let said = Said::<M, N>(self.model);
+        let transcribed = |mesh: &Mesh| {
+            let places = (0..mesh.elements()).map(|e| mesh.place(e, self.span.start, length));
+            let places: Vec<_> = places.collect();
+            let block = |place| transcription::element(M::FORM, &scheme, &sizes, place, &running);
+            let problem = Problem {
+                model: &said,
+                sizes,
+                blocks: places.iter().map(|place| block(*place)).collect(),
+                end: (!end.is_empty()).then(|| transcription::end(M::FORM, N, self.span.end, &end)),
+                lengths: places.iter().map(|(_, h)| *h).collect(),
+                ends: self.ends(),
+            };
+            (problem, places)
         };
-        let mut iterate = self.first(&table, &problem, &places)?;
+        let (problem, places) = transcribed(&mesh);
+        let halves = mesh.halved();
+        let mut iterate = self.guessed(&table, &problem, &places)?;
         let mut history = Vec::new();
         let searched = problem.solve(&mut iterate, self.control, &mut history);
         let iterations = history.len();
         let optimum = self.optimum(&problem, &table, mesh, &iterate, history);
         let kind = match searched {
-            Ok(()) => return Ok(optimum),
+            Ok(()) => {
+                let (fine, places) = transcribed(&halves);
+                let warnings = self.doubts(&table, (&fine, &places), &optimum);
+                return Ok(optimum.with_warnings(warnings));
+            }
             Err(Failure::Undefined { element }) => OptimalControlErrorKind::Undefined {
                 element,
                 time: places.get(element).map_or(self.span.end, |(t, _)| *t),
@@ -399,8 +413,8 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
         ends
     }
 
-    /// The first iterate on the mesh, from the guess; prescribed components at the ends are satisfied.
-    fn first(
+    /// The first iterate on the mesh, from the guess.
+    fn guessed(
         &self,
         table: &SchemeTable,
         problem: &Problem<'_>,
@@ -408,6 +422,24 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
     ) -> Result<Iterate, OptimalControlErrorKind> {
         let line = Box::new(straight(&self.conditions, &self.span)) as Curve<'_, N>;
         let curve = self.guess.as_ref().unwrap_or(&line);
+        let source = |name: &&str| {
+            let given = self.inputs.iter().find(|(own, _)| own == name);
+            given.map(|(_, function)| function)
+        };
+        let sources: Vec<_> = M::INPUTS.iter().map(source).collect();
+        let value = |_: usize, input: usize, t: f64| sources[input].map_or(0.0, |u| u(t));
+        self.first(table, problem, places, (curve, &value))
+    }
+
+    /// An iterate on the mesh without multipliers, along a curve and with the inputs by element, number and time;
+    /// prescribed components at the ends are satisfied.
+    fn first(
+        &self,
+        table: &SchemeTable,
+        problem: &Problem<'_>,
+        places: &[(f64, f64)],
+        (curve, input_value): (&Curve<'_, N>, &InputValue<'_>),
+    ) -> Result<Iterate, OptimalControlErrorKind> {
         let scheme = table.view();
         let sizes = problem.sizes;
         let state = |t: f64| {
@@ -422,7 +454,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
             multipliers: vec![DVector::zeros(sizes.interior); places.len()],
             costates: vec![DVector::zeros(2 * N); places.len() + 1],
         };
-        for (t, h) in places {
+        for (element, (t, h)) in places.iter().enumerate() {
             iterate.nodes.push(node(t + h)?);
             let mut interior = Vec::with_capacity(sizes.interior);
             for at in scheme.unknown_nodes {
@@ -435,13 +467,12 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
             }
             iterate.interiors.push(DVector::from_vec(interior));
             let mut steering = DVector::zeros(sizes.steering());
-            for (name, function) in &self.inputs {
-                let input = place(M::INPUTS, name)?;
+            for input in 0..M::INPUTS.len() {
                 // The coefficient of P_k: ∫ P_k u divided by ∫ P_k².
                 let mut basis = [0.0; MAX_NODES];
                 for (at, weight) in scheme.nodes.iter().zip(scheme.weights) {
                     legendre(*at, &mut basis);
-                    let value = weight * function(t + at * h);
+                    let value = weight * input_value(element, input, t + at * h);
                     for k in 0..sizes.coefficients {
                         steering[k * sizes.inputs + input] += (2 * k + 1) as f64 * basis[k] * value;
                     }
@@ -504,6 +535,7 @@ impl<'m, M: Controlled<N>, const N: usize> OptimalControl<'m, M, N> {
             costates: found.costates(iterate),
             pieces: found.pieces,
             history,
+            warnings: Vec::new(),
         }
     }
 }

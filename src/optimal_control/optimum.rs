@@ -2,7 +2,7 @@
 
 use super::problem::{Iterate, Problem};
 use super::search::Iteration;
-use crate::assembly::{Iterate as ChainIterate, Mesh, Solution};
+use crate::assembly::{Iterate as ChainIterate, Mesh, MeshWarning, Solution};
 use crate::driven::{Driven, InputError};
 use crate::motion::Motion;
 use nalgebra::DVector;
@@ -24,6 +24,7 @@ pub struct Optimum<const N: usize> {
     pub(super) pieces: Arc<Pieces>,
     pub(super) costates: Vec<Costate<N>>,
     pub(super) history: Vec<Iteration>,
+    pub(super) warnings: Vec<MeshWarning>,
 }
 
 impl<const N: usize> fmt::Debug for Optimum<N> {
@@ -99,6 +100,15 @@ impl<const N: usize> Optimum<N> {
         &self.history
     }
 
+    /// What makes the motion doubtful: whether elements of half the length change it, by one correction.
+    pub fn warnings(&self) -> &[MeshWarning] {
+        &self.warnings
+    }
+
+    pub(super) fn with_warnings(self, warnings: Vec<MeshWarning>) -> Self {
+        Self { warnings, ..self }
+    }
+
     /// The number of iterations.
     pub fn iterations(&self) -> usize {
         self.history.len()
@@ -123,7 +133,7 @@ impl Pieces {
     }
 
     /// The value of an input in an element.
-    fn at(&self, element: usize, input: usize, t: f64) -> f64 {
+    pub(super) fn at(&self, element: usize, input: usize, t: f64) -> f64 {
         let (start, end) = (self.times[element], self.times[element + 1]);
         let mut basis = [0.0; MAX_NODES];
         legendre((t - start) / (end - start), &mut basis);

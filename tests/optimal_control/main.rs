@@ -497,3 +497,49 @@ fn of_guesses_for_an_input_the_last_one_counts() {
     // ∫ 2² dt.
     assert!((best.history()[0].cost - 4.0).abs() < 1e-12);
 }
+
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k/2*x^2, input(u), force(x) = u, output(effort) = u^2)]
+struct Swing {
+    k: f64,
+}
+
+/// Optima on elements that do not resolve the motion have a warning: a swing of ten periods on five elements, and on a
+/// hundred, and the cart on forty.
+#[test]
+fn optima_that_the_elements_do_not_resolve_are_told() {
+    let swing = Swing { k: 100.0 };
+    let of = |elements: usize| {
+        let best = OptimalControl::of(&swing).elements(elements);
+        let (start, end) = (swing.state([0.0], [0.0]), swing.state([1.0], [0.0]));
+        let best = best.from_to(start, end, 0.0..6.0).running_cost("effort");
+        best.solve().expect("an optimum")
+    };
+    let (coarse, fine) = (of(5), of(100));
+    assert_eq!(fine.warnings(), []);
+    // By the controllability Gramian of x'' = −100 x + u: λᵀ y with W λ = y, y = (1, 0), W = ∫ Φ B Bᵀ Φᵀ dt.
+    let (w, t) = (10.0_f64, 6.0_f64);
+    let wqq = (t / 2.0 - (2.0 * w * t).sin() / (4.0 * w)) / (w * w);
+    let wvv = t / 2.0 + (2.0 * w * t).sin() / (4.0 * w);
+    let wqv = (1.0 - (2.0 * w * t).cos()) / (4.0 * w * w);
+    let cost = wvv / (wqq * wvv - wqv * wqv);
+    assert!(
+        (fine.cost() / cost - 1.0).abs() <= 1e-4,
+        "{} {cost}",
+        fine.cost()
+    );
+    assert!(
+        (coarse.cost() / cost - 1.0).abs() > 0.1,
+        "{}",
+        coarse.cost()
+    );
+    let [warning] = coarse.warnings() else {
+        panic!("{:?}", coarse.warnings());
+    };
+    assert!(
+        warning
+            .to_string()
+            .starts_with("5 elements do not resolve the motion")
+    );
+    let cart = swing_up().solve().expect("an optimum");
+    assert_eq!(cart.warnings(), []);
+}
