@@ -85,8 +85,7 @@ impl Ladder {
         let ratio = longer / step;
         let power = match (self.differences, self.attempts.iter().rev().nth(1)) {
             (Some(earlier), Some(first)) if earlier <= RESOLVED => {
-                let power = (earlier / differences).ln() / (first.step / longer).ln();
-                Some(power).filter(|power| power.is_finite())
+                power_of(earlier / differences, [first.step / longer, ratio])
             }
             _ => None,
         };
@@ -141,5 +140,59 @@ impl Ladder {
             0.0
         };
         Verdict::Shorter(step * factor.clamp(MIN_FACTOR, MAX_FACTOR))
+    }
+}
+
+/// The power p of errors C hᵖ, from the ratio of the difference of a first and a second run to that of the second and a
+/// third one: (aᵖ − 1)/(1 − b⁻ᵖ), with a and b the ratios of their steps. `None` where steps or
+/// differences do not fall.
+fn power_of(differences: f64, [a, b]: [f64; 2]) -> Option<f64> {
+    /// Powers beyond these are not those of an element.
+    const RANGE: [f64; 2] = [-40.0, 64.0];
+    const HALVINGS: u32 = 60;
+    let is_possible = differences > 0.0 && differences.is_finite() && a > 1.0 && b > 1.0;
+    if !is_possible {
+        return None;
+    }
+    let (a, b) = (a.ln(), b.ln());
+    let ratio = |p: f64| match p == 0.0 {
+        true => a / b,
+        false => -(p * a).exp_m1() / (-p * b).exp_m1(),
+    };
+    let [mut low, mut high] = RANGE;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if ratio(middle) < differences {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Some(high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::power_of;
+
+    /// Errors h^p with steps in different ratios. By the first ratio alone, a power of two was 3.5.
+    #[test]
+    fn powers_are_measured_with_any_steps() {
+        for (steps, power) in [
+            ([1.5, 1.0, 1.0 / 1.2], 2.0_f64),
+            ([1.5, 1.0, 0.4], 6.0),
+            ([1.2, 1.0, 1.0 / 1.2], 14.0),
+            ([1.2, 1.0, 0.9], 0.5),
+            ([1.2, 1.0, 0.7], -1.0),
+        ] {
+            let [first, second, third] = steps.map(|h: f64| h.powf(power));
+            let differences = (first - second) / (second - third);
+            let found = power_of(differences, [steps[0], 1.0 / steps[2]]);
+            let off = (found.expect("a power") - power).abs();
+            assert!(off <= 1e-12 * power.abs().max(1.0), "{power}: {off}");
+        }
+        for nothing in [0.0, f64::INFINITY, f64::NAN] {
+            assert_eq!(power_of(nothing, [1.5, 1.2]), None);
+        }
     }
 }
