@@ -31,7 +31,7 @@ pub(crate) use derivative::derivatives;
 pub(crate) use kinks::crossed_kinks;
 pub(crate) use mesh::Mesh;
 pub(crate) use newton::{Assembly, By, Iterate, Problem};
-pub(crate) use resolved::{HalvedCorrection, part_of_extent};
+pub(crate) use resolved::HalvedCorrection;
 pub(crate) use solution::Solution;
 
 /// A curve t ↦ (q, dq/dt).

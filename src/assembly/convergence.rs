@@ -53,7 +53,7 @@ impl Size {
     };
 
     /// The size relative to the whole iterate.
-    pub(super) fn whole(self) -> f64 {
+    pub(crate) fn whole(self) -> f64 {
         self.whole
     }
 

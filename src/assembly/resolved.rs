@@ -5,12 +5,10 @@
 //! decreases.
 
 use super::chain::Chain;
-#[cfg(feature = "sparse")]
-use super::convergence::Size;
 use super::error::AssemblyError;
 use super::newton::{Assembly, Iterate, Problem};
 use super::warning::MeshWarning;
-use crate::numbers::{larger, largest, raise, smaller};
+use crate::numbers::{larger, raise, smaller};
 use tfe_runtime::Element;
 
 /// Below this pivot ratio a solution is checked: it may be a thousand times as large as the prescribed values.
@@ -24,7 +22,11 @@ const ROUNDINGS: f64 = 1e-6;
 /// discretisation error grows by the factor by which the error decreases, at least four.
 const LEFT: f64 = 0.5;
 
-/// The least extent, relative to the values themselves: that of a motion at rest is its rounding errors.
+/// The largest change by that correction without a warning, relative to the extent of the motion; runs have the same
+/// limit (T-121).
+const MAX: f64 = 0.03;
+
+/// The least extent, relative to the whole solution: that of a motion at rest is its rounding errors.
 const MIN: f64 = 1e-6;
 
 impl Chain {
@@ -44,6 +46,9 @@ impl Chain {
     }
 }
 
+/// Momenta and coordinates of a node, and its correction in the order (p, q).
+type Corrected<'a> = (&'a [f64], &'a [f64], &'a [f64]);
+
 /// The size of one correction by Newton's method on elements of half the length.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HalvedCorrection {
@@ -60,16 +65,16 @@ impl HalvedCorrection {
         part: f64::INFINITY,
     };
 
-    /// Corrections of nodes, and of global unknowns relative to their scales, with their size; see [`part_of_extent`].
-    pub(crate) fn of<'a>(
-        size: Size,
-        nodes: &[[&[f64]; 2]],
-        corrections: impl IntoIterator<Item = &'a [f64]>,
+    /// A correction of nodes, and of global unknowns, which is given relative to their scales. `whole` is its [size](super::size)
+    /// relative to the whole solution.
+    pub(crate) fn of(
+        whole: f64,
+        nodes: &[Corrected<'_>],
         globals: impl IntoIterator<Item = f64>,
     ) -> Self {
         Self {
-            whole: size.whole(),
-            part: part_of_extent(nodes, corrections, globals),
+            whole,
+            part: smaller(part_of_extent(nodes, globals), whole / MIN),
         }
     }
 
@@ -80,7 +85,12 @@ impl HalvedCorrection {
 
     /// The warnings for a solution on this number of elements.
     pub(crate) fn doubts(self, elements: usize) -> Vec<MeshWarning> {
-        MeshWarning::unless_resolved(elements, self.part)
+        let change = self.part;
+        // A NaN is no solution, which the iteration has reported.
+        match change > MAX {
+            true => vec![MeshWarning::Unresolved { elements, change }],
+            false => Vec::new(),
+        }
     }
 }
 
@@ -130,47 +140,37 @@ impl<const N: usize> Assembly<N> {
 
     /// The size of the last correction.
     fn correction<P: Problem<N>>(&self, problem: &P, iterate: &Iterate<N>) -> HalvedCorrection {
-        let nodes = iterate.nodes.iter().map(|node| [&node.p[..], &node.q]);
+        let nodes = iterate.nodes.iter().enumerate();
+        let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], self.chain().node(e)));
         let nodes: Vec<_> = nodes.collect();
-        let corrections = (0..nodes.len()).map(|e| self.chain().node(e));
         let globals = self.chain().globals().iter().enumerate();
         let globals = globals.map(|(k, correction)| correction / problem.scale(k));
-        HalvedCorrection::of(self.size(problem, iterate), &nodes, corrections, globals)
+        HalvedCorrection::of(self.size(problem, iterate).whole(), &nodes, globals)
     }
 }
 
-/// The size of corrections of nodes, in the order (p, q), relative to the extents of all momenta and of all coordinates
-/// of the nodes [p, q] of a motion, and of global unknowns, which are given relative to their scales.
-pub(crate) fn part_of_extent<'a>(
-    nodes: &[[&[f64]; 2]],
-    corrections: impl IntoIterator<Item = &'a [f64]>,
-    globals: impl IntoIterator<Item = f64>,
-) -> f64 {
+/// The size of a correction relative to the extents of all momenta and of all coordinates of a motion; of global unknowns
+/// it is given relative to their scales.
+fn part_of_extent(nodes: &[Corrected<'_>], globals: impl IntoIterator<Item = f64>) -> f64 {
     let mut most = 0.0;
     for correction in globals {
         raise(&mut most, correction.abs());
     }
-    let extents = [0, 1].map(|kind| extent(&|| nodes.iter().map(move |node| node[kind])));
-    for correction in corrections {
-        let (of_p, of_q) = correction.split_at(correction.len() / 2);
-        for (part, extent) in [of_p, of_q].into_iter().zip(extents) {
-            if extent > 0.0 {
-                raise(&mut most, largest(part) / extent);
+    for kind in 0..2 {
+        let (mut extent, mut correction) = (0.0, 0.0);
+        let n = nodes.first().map_or(0, |(p, ..)| p.len());
+        for a in 0..n {
+            let values = || nodes.iter().map(|(p, q, _)| [p, q][kind][a]);
+            let high = values().fold(f64::NEG_INFINITY, larger);
+            let low = values().fold(f64::INFINITY, smaller);
+            raise(&mut extent, high - low);
+            for (.., change) in nodes {
+                raise(&mut correction, change[kind * n + a].abs());
             }
+        }
+        if extent > 0.0 {
+            raise(&mut most, correction / extent);
         }
     }
     most
-}
-
-/// The largest difference between two values of the same component, at least [`MIN`] of the values themselves.
-fn extent<'a, I: Iterator<Item = &'a [f64]>>(values: &dyn Fn() -> I) -> f64 {
-    let components = values().next().map_or(0, <[f64]>::len);
-    let mut extent = 0.0;
-    for a in 0..components {
-        let high = values().fold(f64::NEG_INFINITY, |high, value| larger(high, value[a]));
-        let low = values().fold(f64::INFINITY, |low, value| smaller(low, value[a]));
-        raise(&mut extent, high - low);
-        raise(&mut extent, MIN * larger(high.abs(), low.abs()));
-    }
-    extent
 }

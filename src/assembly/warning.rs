@@ -3,10 +3,6 @@
 use crate::numbers::Short;
 use std::fmt;
 
-/// The largest change by a correction on elements of half the length without a warning, relative to the extent of the
-/// motion; runs have the same limit (T-121).
-const FARTHEST: f64 = 0.03;
-
 /// What makes an orbit or a boundary-value motion doubtful although its equations are solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -23,25 +19,12 @@ pub enum MeshWarning {
     },
     /// A force has a kink or a jump inside an element, because a `select`, `abs`, `sign`, `min` or `max` changes its
     /// branch there. Elements then lose their order, and where the force jumps, multipliers and derivatives are wrong: the
-    /// change of the time of the jump is missing. [`PeriodicOrbit::of_simulation`](crate::PeriodicOrbit::of_simulation)
-    /// ends elements there.
+    /// change of the time of the jump is missing. Of orbits,
+    /// [`PeriodicOrbit::of_simulation`](crate::PeriodicOrbit::of_simulation) ends elements there.
     KinksCrossed {
         /// The start of the first such element.
         time: f64,
     },
-}
-
-impl MeshWarning {
-    /// The warnings for a solution on this number of elements that a correction on elements of half the length changes by
-    /// this part of its extent.
-    pub(crate) fn unless_resolved(elements: usize, change: f64) -> Vec<Self> {
-        // A NaN is no solution, of which the iteration has told.
-        if change > FARTHEST {
-            vec![Self::Unresolved { elements, change }]
-        } else {
-            Vec::new()
-        }
-    }
 }
 
 impl fmt::Display for MeshWarning {

@@ -100,7 +100,8 @@ impl<const N: usize> Optimum<N> {
         &self.history
     }
 
-    /// What makes the motion doubtful: whether elements of half the length change it, by one correction.
+    /// What makes the motion doubtful: whether elements of half the length, on which inputs have twice as many
+    /// coefficients, change it, by one correction.
     pub fn warnings(&self) -> &[MeshWarning] {
         &self.warnings
     }

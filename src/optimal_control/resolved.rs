@@ -2,7 +2,7 @@
 
 use super::problem::{Iterate, Problem};
 use super::{Curve, OptimalControl, Optimum};
-use crate::assembly::{MeshWarning, part_of_extent};
+use crate::assembly::{HalvedCorrection, MeshWarning};
 use nalgebra::DVector;
 use tfe_runtime::Controlled;
 use tfe_runtime::scheme::SchemeTable;
@@ -28,23 +28,23 @@ impl<M: Controlled<N>, const N: usize> OptimalControl<'_, M, N> {
             let node = node(t);
             *own = DVector::from_vec([node.p, node.q].concat());
         }
-        let Some(change) = fine.correction_without_multipliers(&mut iterate) else {
+        let Some((whole, change)) = fine.correction_without_multipliers(&mut iterate) else {
             return Vec::new();
         };
-        let nodes = iterate
-            .nodes
-            .iter()
-            .map(|node| <[_; 2]>::from(node.as_slice().split_at(N)));
+        let nodes = iterate.nodes.iter().zip(&change.nodes);
+        let nodes = nodes.map(|(node, change)| {
+            let (p, q) = node.as_slice().split_at(N);
+            (p, q, change.as_slice())
+        });
         let nodes: Vec<_> = nodes.collect();
-        let corrections = change.nodes.iter().map(DVector::as_slice);
-        let change = part_of_extent(&nodes, corrections, []);
-        MeshWarning::unless_resolved(self.elements, change)
+        HalvedCorrection::of(whole, &nodes, []).doubts(self.elements)
     }
 }
 
 impl Problem<'_> {
-    /// The correction of an iterate near a minimum, whose multipliers are not known yet.
-    fn correction_without_multipliers(&self, iterate: &mut Iterate) -> Option<Iterate> {
+    /// The correction of an iterate near a minimum, whose multipliers are not known yet, with its size relative to the
+    /// iterate.
+    fn correction_without_multipliers(&self, iterate: &mut Iterate) -> Option<(f64, Iterate)> {
         let mut chain = self.chain();
         let condensed = self.linearise(iterate).ok()?;
         // Near a minimum, the multipliers hardly depend on the curvature of the quadratic model.
@@ -56,6 +56,6 @@ impl Problem<'_> {
         }
         let condensed = self.linearise(iterate).ok()?;
         let step = self.step(&mut chain, &condensed, iterate, (1.0, 0.0))?;
-        Some(step.change)
+        Some((self.size(&step, &condensed, iterate), step.change))
     }
 }

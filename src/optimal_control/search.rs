@@ -111,7 +111,7 @@ const DISTANCES: usize = 128;
 
 impl Problem<'_> {
     /// The size of the correction relative to the iterate.
-    fn size(&self, step: &Step, condensed: &[Condensed], iterate: &Iterate) -> f64 {
+    pub(super) fn size(&self, step: &Step, condensed: &[Condensed], iterate: &Iterate) -> f64 {
         let n = self.sizes.dof;
         let nodes = iterate.nodes.iter().zip(&step.change.nodes);
         let nodes = nodes.map(|(node, change)| {

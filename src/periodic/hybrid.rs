@@ -8,7 +8,7 @@ use super::phase::Period;
 use super::repeats::{check_repeats, rate};
 use super::rest::{Extent, is_at_rest};
 use super::setup::{PeriodicOrbit, check_advance};
-use crate::assembly::{MeshError, MeshWarning, check_tolerance, part_of_extent};
+use crate::assembly::{HalvedCorrection, MeshError, MeshWarning, check_tolerance, size};
 use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::linearised::Linearised;
@@ -286,12 +286,18 @@ where
         };
         let change = correction.start.iter().enumerate();
         let change: Vec<f64> = change.map(|(row, part)| part * scales.of(row)).collect();
-        let nodes = run.motion().states().iter();
-        let nodes: Vec<_> = nodes
-            .map(|node| [node.p.as_ref(), node.q.as_ref()])
-            .collect();
-        let part = part_of_extent(&nodes, [&change[..]], [correction.stretch / period]);
-        MeshWarning::unless_resolved(self.elements, part)
+        let none = vec![0.0; change.len()];
+        let nodes = run.motion().states().iter().enumerate();
+        let nodes = nodes.map(|(k, node)| {
+            let change = if k == 0 { &change } else { &none };
+            (node.p.as_ref(), node.q.as_ref(), &change[..])
+        });
+        let nodes: Vec<_> = nodes.collect();
+        let matrices = run.transitions().iter().map(DMatrix::transpose);
+        let matrices: Vec<f64> = matrices.flat_map(|rows| rows.as_slice().to_vec()).collect();
+        let period = [correction.stretch / period];
+        let whole = size(nodes.iter().copied(), &matrices, period.into_iter());
+        HalvedCorrection::of(whole, &nodes, period).doubts(self.elements)
     }
 
     /// Refuses an equilibrium if the period is unknown; with a known period it is a valid orbit.

@@ -599,3 +599,29 @@ fn orbits_that_the_elements_do_not_resolve_are_told() {
     let swing = swing.solve().expect("an orbit");
     assert!(swing.warnings().is_empty(), "{swing}");
 }
+
+/// A chain on springs that are at rest at r.
+#[dynamics(
+    coordinates(q[n]),
+    lagrangian = sum(i in 0..n, dot(q[i])^2/2 - (q[i] - r)^2/2) - sum(i in 0..n-1, (q[i+1]-q[i])^2/2 + (q[i+1]-q[i])^4/8),
+    dissipation = sum(i in 0..n, dot(q[i])^2/20),
+    force(q[n-1]) = f*cos(1.4*t),
+)]
+struct Stretched {
+    n: usize,
+    r: f64,
+    f: f64,
+}
+
+/// Where the amplitude of the force is zero, the momenta are rounding errors of no size of their own.
+#[test]
+fn rounding_errors_of_motions_at_rest_have_no_warning() {
+    for (r, elements) in [(0.0, 3), (0.7, 3), (0.7, 10), (0.7, 40), (10.0 / 3.0, 10)] {
+        let still = Stretched { n: 6, r, f: 0.0 };
+        let orbit = PeriodicOrbit::of(&still)
+            .elements(elements)
+            .period(TAU / 1.4);
+        let orbit = orbit.solve().expect("an orbit");
+        assert!(orbit.warnings().is_empty(), "{r} {elements} {orbit}");
+    }
+}

@@ -553,3 +553,34 @@ fn orbits_that_the_elements_do_not_resolve_are_told() {
         }
     }
 }
+
+/// Two masses on springs, with damping and a force of any amplitude.
+#[dynamics(
+    coordinates(x, y),
+    lagrangian = (dot(x)^2 + dot(y)^2)/2 - (x - r)^2/2 - (y - x - r)^2/2 - (y - x)^4/8,
+    dissipation = (dot(x)^2 + dot(y)^2)/20,
+    force(y) = f*cos(t),
+)]
+struct Masses {
+    r: f64,
+    f: f64,
+}
+
+/// Where the amplitude of the force is zero, the momenta are rounding errors of no size of their own.
+#[test]
+fn rounding_errors_of_motions_at_rest_have_no_warning() {
+    for r in [0.0, 0.7, 1.3, 10.0 / 3.0] {
+        let still = Masses { r, f: 0.0 };
+        for elements in [3, 10, 40] {
+            let orbit = PeriodicOrbit::of(&still).elements(elements).period(TAU);
+            let orbit = orbit.guess(move |_| ([r, 2.0 * r], [0.0; 2])).solve();
+            let orbit = orbit.expect("an orbit");
+            assert_eq!(orbit.warnings(), [], "{r} {elements}");
+            let simulation = Simulation::new(&still);
+            let hybrid = PeriodicOrbit::of_simulation(&simulation).elements(elements);
+            let hybrid = hybrid.period(TAU).guess_from(orbit.start()).solve();
+            let hybrid = hybrid.expect("an orbit");
+            assert_eq!(hybrid.warnings(), [], "{r} {elements}");
+        }
+    }
+}

@@ -220,18 +220,9 @@ impl<'m, M: family::Model> Shooting<'m, M> {
 
     /// The size of the correction in a chain.
     fn correction(&self, chain: &Chain) -> HalvedCorrection {
-        let nodes: Vec<_> = self
-            .nodes
-            .iter()
-            .map(|node| [&node.p[..], &node.q])
-            .collect();
-        let corrections = (0..nodes.len()).map(|e| chain.node(e));
-        HalvedCorrection::of(
-            self.size(chain),
-            &nodes,
-            corrections,
-            self.corrected_globals(chain),
-        )
+        let nodes: Vec<_> = self.corrected_nodes(chain).collect();
+        let globals = self.corrected_globals(chain);
+        HalvedCorrection::of(self.size(chain).whole(), &nodes, globals)
     }
 
     /// The chain of the linearised equations.
@@ -402,9 +393,17 @@ impl<'m, M: family::Model> Shooting<'m, M> {
 
     /// The size of the correction relative to the iterate, as for models of fixed size.
     fn size(&self, chain: &Chain) -> Size {
+        let globals = self.corrected_globals(chain);
+        sizes(self.corrected_nodes(chain), chain.matrices(), globals)
+    }
+
+    /// Momenta, coordinates and corrections of the nodes.
+    fn corrected_nodes<'a>(
+        &'a self,
+        chain: &'a Chain,
+    ) -> impl Iterator<Item = (&'a [f64], &'a [f64], &'a [f64])> {
         let nodes = self.nodes.iter().enumerate();
-        let nodes = nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)));
-        sizes(nodes, chain.matrices(), self.corrected_globals(chain))
+        nodes.map(|(e, node)| (&node.p[..], &node.q[..], chain.node(e)))
     }
 
     /// The corrections of the global unknowns relative to their scales.
