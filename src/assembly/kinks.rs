@@ -1,13 +1,12 @@
 //! Kinks and jumps of forces inside the elements of a mesh, which cannot end there.
 
-use super::warning::MeshWarning;
 use tfe_runtime::{Model, State, switching_functions};
 
-/// The warning for the first element at whose ends a switching function of the model has different signs.
+/// The start of the first element at whose ends a switching function of the model has different signs.
 pub(crate) fn crossed_kinks<M: Model<N>, const N: usize>(
     model: &M,
     nodes: impl Iterator<Item = (f64, State<N>)>,
-) -> Option<MeshWarning> {
+) -> Option<f64> {
     if const { M::FACTS.smooth } {
         return None;
     }
@@ -17,7 +16,7 @@ pub(crate) fn crossed_kinks<M: Model<N>, const N: usize>(
         if let Some((time, before)) = &last
             && before.iter().zip(&here).any(|(a, b)| a * b < 0.0)
         {
-            return Some(MeshWarning::KinksCrossed { time: *time });
+            return Some(*time);
         }
         last = Some((t, here));
     }

@@ -37,7 +37,7 @@ impl<M: Model<N>, const N: usize> Solution<'_, M, N> {
     }
 
     /// The times of all nodes.
-    fn times(&self) -> Vec<f64> {
+    pub(crate) fn times(&self) -> Vec<f64> {
         self.mesh.times_to(self.end, self.start, self.length)
     }
 

@@ -35,7 +35,7 @@ impl fmt::Display for MeshWarning {
                 return write!(
                     f,
                     "a force has a kink or a jump inside an element, first behind t = {}: errors fall more slowly with the number of elements, and \
-                     where it jumps, multipliers and derivatives are wrong; `PeriodicOrbit::of_simulation(&simulation)` ends elements there",
+                     where it jumps, multipliers and derivatives are wrong; for orbits, `PeriodicOrbit::of_simulation(&simulation)` ends elements there",
                     Short(*time)
                 );
             }

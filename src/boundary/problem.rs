@@ -2,7 +2,7 @@
 
 use crate::assembly::{
     Assembly, AssemblyError, ClosureMut, Control, Curve, Iterate, Mesh, MeshError, MeshWarning,
-    Problem, Solution,
+    Problem, Solution, crossed_kinks,
 };
 use crate::motion::{Motion, Node};
 use crate::numbers::Short;
@@ -330,7 +330,13 @@ impl<'m, M: Model<N>, const N: usize> BoundaryValue<'m, M, N> {
         if may_be_singular && assembly.is_doubtful() {
             assembly.check_resolved(halved)?;
         }
-        let warnings = halved.map_or(Vec::new(), |halved| halved.doubts(self.elements));
+        let mut warnings = halved.map_or(Vec::new(), |halved| halved.doubts(self.elements));
+        let nodes = solution.times().into_iter();
+        let crossed = crossed_kinks(
+            self.model,
+            nodes.zip(solution.iterate.nodes.iter().copied()),
+        );
+        warnings.extend(crossed.map(|time| MeshWarning::KinksCrossed { time }));
         Ok(BoundaryMotion { solution, warnings })
     }
 
@@ -460,7 +466,7 @@ impl<M: Model<N>, const N: usize> BoundaryMotion<'_, M, N> {
     }
 
     /// What makes the motion doubtful: whether elements of half the length change it, by one correction of Newton's
-    /// method.
+    /// method, and whether nodes next to each other lie on both sides of a kink or a jump of a force.
     pub fn warnings(&self) -> &[MeshWarning] {
         &self.warnings
     }

@@ -201,7 +201,8 @@ impl<M: Model<N>, const N: usize> Branch<M, N> {
     }
 
     /// What makes the branch doubtful, in the order in which it was found; empty if elements of half the length confirm
-    /// all events and the points that were compared, see [`Continuation`](super::Continuation#resolution).
+    /// all events and the points that were compared, see [`Continuation`](super::Continuation#resolution), and no nodes
+    /// next to each other lie on both sides of a kink or a jump of a force.
     pub fn warnings(&self) -> &[BranchWarning] {
         &self.warnings
     }

@@ -9,7 +9,7 @@ use super::problem::Continued;
 use super::progress::Progress;
 use super::solved::{Solved, solved};
 use super::warning::BranchWarning;
-use crate::assembly::{Assembly, AssemblyError, Control, Iterate, Problem};
+use crate::assembly::{Assembly, AssemblyError, Control, Iterate, Problem, crossed_kinks};
 use crate::periodic::OrbitError;
 use crate::periodic::orbit::trivial_of;
 use crate::periodic::problem::Global;
@@ -205,8 +205,29 @@ impl<'c, M: Model<N> + Clone, const N: usize> Follower<'c, M, N> {
 
     /// Appends the last orbit to the branch.
     fn record(&self, branch: &mut Branch<M, N>) {
+        self.find_kinks(branch);
         branch.points.push(self.point(&self.last));
         branch.members.push(self.last.member.clone());
+    }
+
+    /// Looks for kinks of forces in the elements of the last orbit, unless an orbit before it has a warning.
+    fn find_kinks(&self, branch: &mut Branch<M, N>) {
+        let is_kink =
+            |warning: &BranchWarning| matches!(warning, BranchWarning::KinksCrossed { .. });
+        if branch.warnings.iter().any(is_kink) {
+            return;
+        }
+        let (frame, member) = (&self.frame, &self.last.member);
+        let times = frame.mesh.times(frame.start, member.period);
+        let nodes = times.zip(member.iterate.nodes.iter().copied());
+        let crossed = crossed_kinks(&member.model, nodes);
+        branch
+            .warnings
+            .extend(crossed.map(|time| BranchWarning::KinksCrossed {
+                point: branch.points.len(),
+                parameter: self.last.parameter(),
+                time,
+            }));
     }
 
     /// Compares the last orbit with that of elements of half the length, unless an orbit before it has a warning.

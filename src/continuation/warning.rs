@@ -4,9 +4,9 @@ use super::events::EventKind;
 use crate::numbers::Short;
 use std::fmt;
 
-/// What makes a branch doubtful although it could be followed: elements of half the length contradict it. Take more
-/// elements, or elements of unequal length with [`graded`](super::Continuation::graded), from
-/// [`Orbit::equidistributed`](crate::periodic::Orbit::equidistributed).
+/// What makes a branch doubtful although it could be followed: elements of half the length contradict it, or contain
+/// kinks of forces. Where the elements do not resolve it, take more elements, or elements of unequal length with
+/// [`graded`](super::Continuation::graded), from [`Orbit::equidistributed`](crate::periodic::Orbit::equidistributed).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum BranchWarning {
@@ -35,6 +35,17 @@ pub enum BranchWarning {
         kind: EventKind,
         /// The parameter of the event.
         parameter: f64,
+    },
+    /// A force has a kink or a jump inside an element of this orbit, the first one of the branch, because a `select`,
+    /// `abs`, `sign`, `min` or `max` changes its branch there. Elements then lose their order, and where the force jumps,
+    /// directions, multipliers and events of the branch are wrong: the change of the time of the jump is missing.
+    KinksCrossed {
+        /// The index of the point in [`Branch::points`](super::Branch::points).
+        point: usize,
+        /// The parameter of the point.
+        parameter: f64,
+        /// The start of the first such element.
+        time: f64,
     },
 }
 
@@ -71,6 +82,17 @@ impl fmt::Display for BranchWarning {
                 "event {event}, {kind:?} at the parameter {}, may be one of the elements: elements of half the length do not confirm it; \
                  take more elements, or shorter ones where the motion is fast",
                 Short(*parameter)
+            ),
+            Self::KinksCrossed {
+                point,
+                parameter,
+                time,
+            } => write!(
+                f,
+                "from point {point} on, at the parameter {}, a force has a kink or a jump inside an element, first behind t = {}: errors fall more \
+                 slowly with the number of elements, and where it jumps, multipliers and events of the branch are wrong",
+                Short(*parameter),
+                Short(*time)
             ),
         }
     }

@@ -291,7 +291,8 @@ impl<'m, M: Model<N>, const N: usize> PeriodicOrbit<'m, M, N> {
         let mut warnings = halved.map_or(Vec::new(), |halved| halved.doubts(self.elements));
         let times = problem.mesh.times(problem.start, problem.period);
         let nodes = times.zip(iterate.nodes.iter().copied());
-        warnings.extend(crossed_kinks(self.model, nodes));
+        let crossed = crossed_kinks(self.model, nodes);
+        warnings.extend(crossed.map(|time| MeshWarning::KinksCrossed { time }));
         warnings
     }
 

@@ -2,6 +2,7 @@
 
 use crate::differences::difference_over;
 use crate::largest::larger;
+use tfe::continuation::BranchWarning;
 use tfe::nalgebra::{Complex, DMatrix};
 use tfe::prelude::*;
 use tfe::runtime::{Family, Rule};
@@ -489,4 +490,72 @@ fn multipliers_of_an_orbit_with_dry_friction_are_those_of_its_motion() {
             .to_string()
             .contains("`PeriodicOrbit::of_simulation(&simulation)`")
     );
+}
+
+/// A driven oscillator with a stop.
+#[dynamics(
+    coordinates(x),
+    lagrangian = dot(x)^2/2 - x^2/2 - s/2*max(x - gap, 0)^2 + a*x*cos(w*t),
+    force(x) = -c*dot(x),
+    sensitivity(a),
+)]
+#[derive(Clone)]
+struct Stop {
+    s: f64,
+    gap: f64,
+    a: f64,
+    w: f64,
+    c: f64,
+}
+
+/// Below the amplitude at which the stop is met, which is known in closed form, the motion is linear.
+#[test]
+fn branches_across_kinks_have_a_warning_where_they_begin() {
+    let stop = Stop {
+        s: 5.0,
+        gap: 0.2,
+        a: 0.05,
+        w: 1.3,
+        c: 0.15,
+    };
+    let branch = |range| {
+        let branch = Continuation::of(&stop).parameter(|stop| &mut stop.a);
+        let branch = branch.range(range).elements(60);
+        let branch = branch.period(|stop| std::f64::consts::TAU / stop.w);
+        branch.run().expect("a branch")
+    };
+    let met = stop.gap * (1.0 - stop.w * stop.w).hypot(stop.c * stop.w);
+    assert!(branch(0.05..0.99 * met).warnings().is_empty());
+    let across = branch(0.05..2.0 * met);
+    let Some(BranchWarning::KinksCrossed { point, time, .. }) = across.warnings().first() else {
+        panic!("{:?}", across.warnings());
+    };
+    // Between two nodes the motion exceeds the values there by 1/cos(π/60) at most.
+    assert!(across.points()[*point].parameter > met);
+    assert!(across.points()[point - 1].parameter <= 1.0015 * met);
+    let orbit = across.orbit(*point).expect("an orbit");
+    let place = |t: f64| orbit.motion().at(t).expect("inside").q[0] - stop.gap;
+    assert!(place(*time) * place(time + orbit.period() / 60.0) < 0.0);
+    let told = across.warnings()[0].to_string();
+    assert!(
+        told.contains("a kink or a jump inside an element"),
+        "{told}"
+    );
+}
+
+/// At one of two ends the stop is met; the velocity keeps its sign, which dry friction has a jump at.
+#[test]
+fn boundary_values_across_kinks_have_a_warning() {
+    let between = |from: f64, to: f64| {
+        let motion = BoundaryValue::of(&DRIVEN).elements(20);
+        let motion = motion.from_to([from], [to], 0.0..0.4);
+        motion.solve().expect("a motion")
+    };
+    assert_eq!(between(-0.3, 0.1).warnings(), []);
+    let across = between(-0.3, 0.5);
+    let [MeshWarning::KinksCrossed { time }] = across.warnings() else {
+        panic!("{:?}", across.warnings());
+    };
+    let place = |t: f64| across.motion().at(t).expect("inside").q[0] - DRIVEN.gap;
+    assert!(place(*time) < 0.0 && place(time + 0.02) > 0.0);
 }
