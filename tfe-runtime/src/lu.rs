@@ -40,32 +40,31 @@ pub fn factor(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(
 
 #[inline(always)]
 fn factor_plainly(size: usize, matrix: &mut [f64], pivots: &mut [usize]) -> Result<(), Singular> {
-    for column in 0..size {
-        let mut pivot = column;
-        for row in column + 1..size {
-            if matrix[row * size + column].abs() > matrix[pivot * size + column].abs() {
-                pivot = row;
+    for (column, exchanged) in pivots[..size].iter_mut().enumerate() {
+        let (upper, lower) = matrix[..size * size].split_at_mut((column + 1) * size);
+        let own = &mut upper[column * size..];
+        let (mut pivot, mut largest) = (column, own[column].abs());
+        for (row, candidate) in (column + 1..).zip(lower.chunks_exact(size)) {
+            if candidate[column].abs() > largest {
+                (pivot, largest) = (row, candidate[column].abs());
             }
         }
-        pivots[column] = pivot;
-        let value = matrix[pivot * size + column];
+        *exchanged = pivot;
+        if pivot != column {
+            own.swap_with_slice(&mut lower[(pivot - column - 1) * size..][..size]);
+        }
+        let (head, pivot_row) = own.split_at(column + 1);
+        let value = head[column];
         if value == 0.0 || !value.is_finite() {
             return Err(Singular { column });
         }
-        if pivot != column {
-            for j in 0..size {
-                matrix.swap(pivot * size + j, column * size + j);
-            }
-        }
-        let (upper, lower) = matrix.split_at_mut((column + 1) * size);
-        let pivot_row = &upper[column * size..];
-        for row in lower.chunks_exact_mut(size).take(size - column - 1) {
-            let factor = row[column] / pivot_row[column];
-            row[column] = factor;
+        for row in lower.chunks_exact_mut(size) {
+            let (head, tail) = row.split_at_mut(column + 1);
+            let factor = head[column] / value;
+            head[column] = factor;
             // Zero blocks are common in tangents of several coordinates.
             if factor != 0.0 {
-                let tail = row[column + 1..].iter_mut();
-                for (entry, pivot) in tail.zip(&pivot_row[column + 1..]) {
+                for (entry, pivot) in tail.iter_mut().zip(pivot_row) {
                     *entry -= factor * pivot;
                 }
             }
@@ -84,19 +83,21 @@ pub fn solve(size: usize, factors: &[f64], pivots: &[usize], vector: &mut [f64])
     if size >= LARGE || cfg!(not(feature = "alloc")) {
         return solve_large(size, factors, vector);
     }
-    for row in 1..size {
-        let mut sum = vector[row];
-        for j in 0..row {
-            sum -= factors[row * size + j] * vector[j];
+    let rows = factors[..size * size].chunks_exact(size.max(1)).enumerate();
+    let vector = &mut vector[..size];
+    for (k, row) in rows.clone() {
+        let (done, own) = vector.split_at_mut(k);
+        for (factor, known) in row.iter().zip(done) {
+            own[0] -= factor * *known;
         }
-        vector[row] = sum;
     }
-    for row in (0..size).rev() {
-        let mut sum = vector[row];
-        for j in row + 1..size {
-            sum -= factors[row * size + j] * vector[j];
+    for (k, row) in rows.rev() {
+        let (own, done) = vector.split_at_mut(k + 1);
+        let mut sum = own[k];
+        for (factor, known) in row[k + 1..].iter().zip(&*done) {
+            sum -= factor * known;
         }
-        vector[row] = sum / factors[row * size + row];
+        own[k] = sum / row[k];
     }
 }
 
