@@ -27,7 +27,6 @@ mod varied;
 use crate::consistency::ModelError;
 use crate::element::Element;
 use crate::error::StepError;
-use crate::legendre::largest;
 use crate::model::{Model, State};
 use crate::newton::{Control, Preference, Solve};
 use crate::points::forms::has_form;
@@ -249,7 +248,7 @@ where
             if let Some(start) = starts.get(lane) {
                 fate.is_used = true;
                 lanes[lane] = true;
-                if !(largest(&start.q).is_finite() && largest(&start.p).is_finite()) {
+                if !start.is_finite() {
                     fate.failure = Some(StepError::NonFinite);
                     is_calm = false;
                 }

@@ -271,21 +271,16 @@ impl<const N: usize> Condenser<N> {
         let end = if const { !M::CONSTRAINTS.is_empty() } {
             let element = scheme.element;
             check_element(M::CONSTRAINTS, element)?;
-            parts.momenta.fill(start.p);
+            parts.kept.momenta.fill(start.p);
             let mut rows = Rows::at_start(parts.rows, model, time, &start.q);
             choose(&mut rows, model, (time, &start.q), parts.active);
             let mut form = ConstrainedForm::new(
-                VelocityForm {
+                VelocityForm::new(
                     model,
-                    scheme,
-                    span,
-                    forces: parts.forces,
-                    momenta: parts.momenta,
-                    masses: parts.masses,
-                    mass_pivots: parts.mass_pivots,
-                    constant_mass: &mut self.memory.mass,
-                    statistics: &mut self.memory.statistics,
-                },
+                    (scheme, span),
+                    parts.kept,
+                    (&mut self.memory.mass, &mut self.memory.statistics),
+                ),
                 Layout::new(&element, N, M::CONSTRAINTS.len()),
                 rows,
                 parts.active,
@@ -294,34 +289,25 @@ impl<const N: usize> Condenser<N> {
             linearise(&mut form, interior, directions, true, system, ends)?;
             form.end_state(interior)?.0
         } else if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
-            let mut equations = PhaseForm {
+            let mut equations = PhaseForm::new(
                 model,
-                scheme,
-                span,
-                momenta: parts.momenta,
-                velocities: parts.forces,
-                masses: parts.masses,
-                swept: false,
-                statistics: &mut self.memory.statistics,
-            };
+                (scheme, span),
+                parts.kept,
+                &mut self.memory.statistics,
+            );
             system.of_phase(&mut equations, interior, directions);
             let sides = system.with_newton_step().solve()?.sides;
             phase_ends::<N>(&scheme, length, interior, directions, sides, ends);
             let (forces, velocities) = interior.as_chunks().0.split_at(scheme.points());
             end_of(&scheme, &span, velocities, forces, &[]).0
         } else {
-            parts.momenta.fill(start.p);
-            let mut equations = VelocityForm {
+            parts.kept.momenta.fill(start.p);
+            let mut equations = VelocityForm::new(
                 model,
-                scheme,
-                span,
-                forces: parts.forces,
-                momenta: parts.momenta,
-                masses: parts.masses,
-                mass_pivots: parts.mass_pivots,
-                constant_mass: &mut self.memory.mass,
-                statistics: &mut self.memory.statistics,
-            };
+                (scheme, span),
+                parts.kept,
+                (&mut self.memory.mass, &mut self.memory.statistics),
+            );
             let mut forces = EndForces::of(&mut self.forces, m);
             system.of_velocities(&mut equations, interior, directions, &mut forces)?;
             let sides = system.with_newton_step().solve()?.sides;

@@ -11,8 +11,7 @@ use crate::constrained::rows::{Independence, Rows, norm};
 use crate::control::START_TOLERANCE;
 use crate::equations::Span;
 use crate::error::{ConstraintError, StepError};
-use crate::evidence::{Energy, conserves_energy, rounding};
-use crate::legendre::largest;
+use crate::evidence::{Energy, Evidence, conserves_energy, rounding};
 use crate::method::{Interval, Last, Memory, Method, set_kicks, total};
 use crate::model::{CoordinateName, Model, State};
 use crate::newton::{Beginning, Control, Solve, newton};
@@ -37,16 +36,11 @@ where
     if matches!(method.control.solve, Solve::FixedPoint) {
         return Err(ConstraintError::NeedsNewton.into());
     }
-    let Interval {
-        start: t,
-        length: h,
-        impulses,
-    } = interval;
+    let (t, h) = (interval.start, interval.length);
     let mut parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
     let is_foreseen = core::mem::take(&mut memory.is_foreseen) && memory.has_reached(state);
     let warm = is_foreseen || method.prepare(memory, &mut parts, h, state)?;
     set_kicks(&scheme, &interval, parts.kicks);
-    let kicks: &[[f64; N]] = parts.kicks;
     let step = Step {
         model,
         scheme,
@@ -65,56 +59,34 @@ where
     };
     let begun = step.begin(memory, &mut rows, parts.active, &mut scratch)?;
     let low = begun.low;
+    let span = Span {
+        t,
+        h,
+        start: state,
+        low: &low,
+        kicks: &*parts.kicks,
+        damping: 0.0,
+    };
     let mut form = ConstrainedForm::new(
-        VelocityForm {
+        VelocityForm::new(
             model,
-            scheme,
-            span: Span {
-                t,
-                h,
-                start: state,
-                low: &low,
-                kicks,
-                damping: 0.0,
-            },
-            forces: parts.forces,
-            momenta: parts.momenta,
-            masses: parts.masses,
-            mass_pivots: parts.mass_pivots,
-            constant_mass: &mut memory.mass,
-            statistics: &mut memory.statistics,
-        },
+            (scheme, span),
+            parts.kept,
+            (&mut memory.mass, &mut memory.statistics),
+        ),
         step.layout,
         rows,
         parts.active,
-        total(impulses, h),
+        total(interval.impulses, h),
     );
-    let beginning = if warm {
-        Beginning::Near
-    } else {
-        Beginning::Far
-    };
-    let evidence = match newton(&mut form, &step.control, &mut scratch, beginning, false) {
-        Ok(evidence) => evidence,
-        Err(error) if !warm => return Err(error),
-        Err(_) => {
-            // The continued polynomial may be a worse initial guess than a constant velocity.
-            step.begin_again(&mut form.constraints, &mut scratch)?;
-            newton(
-                &mut form,
-                &step.control,
-                &mut scratch,
-                Beginning::Far,
-                false,
-            )?
-        }
-    };
+    let evidence = step.solve(&mut form, &mut scratch)?;
     let (end, end_low) = form.end_state(scratch.unknowns)?;
     let constraints = &mut form.constraints;
     step.check_end(constraints, scratch.unknowns, &end)?;
     let end_rows = constraints.rows.independence();
-    let is_conserved =
-        const { conserves_energy::<M, N>() } && impulses.is_empty() && !constraints.rows.drifts();
+    let is_conserved = const { conserves_energy::<M, N>() }
+        && interval.impulses.is_empty()
+        && !constraints.rows.drifts();
     let energy = is_conserved.then(|| {
         let velocities = [begun.velocity, constraints.end_place(scratch.unknowns).2];
         Energy::with(model, (t, h), [state, &end], &velocities)
@@ -122,13 +94,9 @@ where
     let rounding = || rounding(model, (t, h), [state, &end]);
     evidence.check_with(method.control.solve, energy, scheme.element, &rounding)?;
     // Between steps the rows are those of the constraints as declared.
-    if constraints.rows.is_combined() {
-        for place in step.layout.multipliers() {
-            constraints
-                .rows
-                .declared_multipliers(&mut scratch.unknowns[place]);
-        }
-    }
+    constraints
+        .rows
+        .restore_multipliers(&step.layout, scratch.unknowns);
     memory.last = Some(Last {
         t,
         h,
@@ -191,10 +159,8 @@ impl<const N: usize> Step<'_, N> {
         let rates = self.layout.rates();
         let mean = mean_rate(&self.scheme, scratch.unknowns[..rates].as_chunks().0);
         self.combine(rows, (&mean, &units), active);
-        if self.warm && rows.is_combined() {
-            for place in self.layout.multipliers() {
-                rows.combine_multipliers(&mut scratch.unknowns[place]);
-            }
+        if self.warm {
+            rows.combine_multipliers(&self.layout, scratch.unknowns);
         }
         let (velocity, low) = if self.warm {
             (self.continued(scratch.unknowns), memory.low)
@@ -215,6 +181,23 @@ impl<const N: usize> Step<'_, N> {
             low,
             independence,
         })
+    }
+
+    /// Solves the element by Newton's method, once more from a constant velocity where the continued polynomial is a
+    /// worse initial guess.
+    fn solve<M: Model<N>>(
+        &self,
+        form: &mut ConstrainedForm<'_, M, N>,
+        scratch: &mut Scratch<'_>,
+    ) -> Result<Evidence, StepError> {
+        if self.warm {
+            let first = newton(form, &self.control, scratch, Beginning::Near, false);
+            if first.is_ok() {
+                return first;
+            }
+            self.begin_again(&mut form.constraints, scratch)?;
+        }
+        newton(form, &self.control, scratch, Beginning::Far, false)
     }
 
     /// Begins once more, from a constant velocity.
@@ -339,7 +322,7 @@ impl<const N: usize> Step<'_, N> {
         unknowns: &[f64],
         end: &State<N>,
     ) -> Result<(), StepError> {
-        if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
+        if !end.is_finite() {
             return Err(StepError::NonFinite);
         }
         constraints.check_end(self.model, unknowns, self.control.tolerance)

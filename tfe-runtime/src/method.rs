@@ -6,7 +6,7 @@ use crate::constrained::rows::Independence;
 use crate::control::Control;
 use crate::double_double::DoubleDouble;
 use crate::equations::Span;
-use crate::legendre::velocity;
+use crate::legendre::{largest, velocity};
 use crate::lu::Block;
 use crate::model::{First, Form, Model, State};
 use crate::newton::Preference;
@@ -131,6 +131,11 @@ impl<const N: usize> State<N> {
             same &= (self.q[a] == other.q[a]) & (self.p[a] == other.p[a]);
         }
         same
+    }
+
+    /// Whether all numbers are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        largest(&self.q).is_finite() && largest(&self.p).is_finite()
     }
 }
 

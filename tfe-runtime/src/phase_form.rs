@@ -13,6 +13,7 @@ use crate::model::{First, Model, Second};
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 use crate::unlike::{by_coordinate, larger_own, own_increment};
+use crate::workspace::Kept;
 
 pub(crate) struct PhaseForm<'a, M, const N: usize> {
     pub(crate) model: &'a M,
@@ -26,6 +27,28 @@ pub(crate) struct PhaseForm<'a, M, const N: usize> {
     /// Whether `momenta`, velocities and `masses` have been filled by a sweep.
     pub(crate) swept: bool,
     pub(crate) statistics: &'a mut Statistics,
+}
+
+impl<'a, M, const N: usize> PhaseForm<'a, M, N> {
+    /// The equations of one element, on memory of the element.
+    #[inline(always)]
+    pub(crate) fn new(
+        model: &'a M,
+        (scheme, span): (SchemeRef<'a>, Span<'a, N>),
+        kept: Kept<'a, N>,
+        statistics: &'a mut Statistics,
+    ) -> Self {
+        Self {
+            model,
+            scheme,
+            span,
+            momenta: kept.momenta,
+            velocities: kept.forces,
+            masses: kept.masses,
+            swept: false,
+            statistics,
+        }
+    }
 }
 
 impl<M, const N: usize> PhaseForm<'_, M, N>

@@ -3,7 +3,6 @@
 use crate::equations::{Equations, Span};
 use crate::error::StepError;
 use crate::evidence::{Energy, Evidence, conserves_energy, rounding};
-use crate::legendre::largest;
 use crate::method::{
     Last, cold_phase, cold_velocity, continued_ratio, end_of, may_be_phase, set_extrapolation,
     set_kicks,
@@ -42,39 +41,52 @@ where
     where
         M: Model<N>,
     {
+        let step = interval.length;
+        if !(step.is_finite() && step != 0.0) {
+            return Err(StepError::InvalidStep { step });
+        }
+        if const { !M::CONSTRAINTS.is_empty() } {
+            return crate::constrained_step::advance(self, memory, workspace, interval, state);
+        }
+        self.advance_free(memory, workspace, interval, state)
+    }
+
+    /// The same without constraints.
+    fn advance_free<const N: usize>(
+        &self,
+        memory: &mut Memory<N>,
+        workspace: Workspace<'_>,
+        interval: Interval<'_, N>,
+        state: &mut State<N>,
+    ) -> Result<(), StepError>
+    where
+        M: Model<N>,
+    {
         let Interval {
             start: t,
             length: h,
             impulses,
         } = interval;
-        if !(h.is_finite() && h != 0.0) {
-            return Err(StepError::InvalidStep { step: h });
-        }
-        if const { !M::CONSTRAINTS.is_empty() } {
-            return crate::constrained_step::advance(self, memory, workspace, interval, state);
-        }
         let scheme = self.tables.view();
         let mut parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
         let warm = self.prepare(memory, &mut parts, h, state)?;
         set_kicks(&scheme, &interval, parts.kicks);
         let low = if warm { memory.low } else { State::ZERO };
-        let kicks: &[[f64; N]] = parts.kicks;
         let span = Span {
             t,
             h,
             start: state,
             low: &low,
-            kicks,
+            kicks: &*parts.kicks,
             damping: 0.0,
         };
-        let known = memory.factored == Some(h);
         // After a failure there is no polynomial to continue from.
         memory.last = None;
         let mut driver = Driver {
             control: &self.control,
             origin: parts.origin,
             warm,
-            known,
+            known: memory.factored.take() == Some(h),
             linear: M::FACTS.linear,
             preference: &mut memory.preference,
             has_factors: false,
@@ -86,36 +98,26 @@ where
             tangent: parts.tangent,
             pivots: parts.tangent_pivots,
         };
-        memory.factored = None;
         let (end, end_low) = if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form()
         {
-            let mut equations = PhaseForm {
-                model: self.model,
-                scheme,
-                span,
-                momenta: parts.momenta,
-                velocities: parts.forces,
-                masses: parts.masses,
-                swept: false,
-                statistics: &mut memory.statistics,
-            };
+            let mut equations = PhaseForm::new(
+                self.model,
+                (scheme, span),
+                parts.kept,
+                &mut memory.statistics,
+            );
             let scratch = driver.solve(&mut equations, scratch, |unknowns| {
                 cold_phase(self.model, &scheme, t, state, unknowns);
             })?;
             let (pi, kappa) = scratch.unknowns.as_chunks().0.split_at(scheme.points());
             end_of(&scheme, &span, kappa, pi, impulses)
         } else {
-            let mut equations = VelocityForm {
-                model: self.model,
-                scheme,
-                span,
-                forces: parts.forces,
-                momenta: parts.momenta,
-                masses: parts.masses,
-                mass_pivots: parts.mass_pivots,
-                constant_mass: &mut memory.mass,
-                statistics: &mut memory.statistics,
-            };
+            let mut equations = VelocityForm::new(
+                self.model,
+                (scheme, span),
+                parts.kept,
+                (&mut memory.mass, &mut memory.statistics),
+            );
             let scratch = driver.solve(&mut equations, scratch, |unknowns| {
                 cold_velocity(self.model, t, state, unknowns);
             })?;
@@ -123,23 +125,11 @@ where
                 &scheme,
                 &span,
                 scratch.unknowns.as_chunks().0,
-                parts.forces,
+                equations.forces,
                 impulses,
             )
         };
-        if !(largest(&end.q).is_finite() && largest(&end.p).is_finite()) {
-            return Err(StepError::NonFinite);
-        }
-        // A contracting fixed-point iteration is proof enough, and such a step is to have no additional cost.
-        if let Some(evidence) = &driver.evidence
-            && !M::FACTS.linear
-        {
-            let energy = (impulses.is_empty() && conserves_energy::<M, N>())
-                .then(|| Energy::of(self.model, (t, h), [state, &end]))
-                .flatten();
-            let rounding = || rounding(self.model, (t, h), [state, &end]);
-            evidence.check_with(self.control.solve, energy, scheme.element, &rounding)?;
-        }
+        self.check_end(driver.evidence.as_ref(), &interval, [state, &end])?;
         if driver.has_factors && !(M::FACTS.linear && M::FACTS.time_dependent) {
             memory.factored = Some(h);
         }
@@ -156,6 +146,32 @@ where
         Ok(())
     }
 
+    /// Refuses an end that is not finite, and one that Newton's method does not show to continue the motion.
+    fn check_end<const N: usize>(
+        &self,
+        evidence: Option<&Evidence>,
+        interval: &Interval<'_, N>,
+        [start, end]: [&State<N>; 2],
+    ) -> Result<(), StepError>
+    where
+        M: Model<N>,
+    {
+        if !end.is_finite() {
+            return Err(StepError::NonFinite);
+        }
+        // A contracting fixed-point iteration is proof enough, and such a step is to have no additional cost.
+        let Some(evidence) = evidence.filter(|_| !M::FACTS.linear) else {
+            return Ok(());
+        };
+        let times = (interval.start, interval.length);
+        let energy = (interval.impulses.is_empty() && conserves_energy::<M, N>())
+            .then(|| Energy::of(self.model, times, [start, end]))
+            .flatten();
+        let rounding = || rounding(self.model, times, [start, end]);
+        let element = self.tables.view().element;
+        evidence.check_with(self.control.solve, energy, element, &rounding)
+    }
+
     /// Sets the initial guess of the unknowns; true if it continues the last step.
     pub(crate) fn prepare<const N: usize>(
         &self,
@@ -167,7 +183,7 @@ where
     where
         M: Model<N>,
     {
-        if !(largest(&state.q).is_finite() && largest(&state.p).is_finite()) {
+        if !state.is_finite() {
             return Err(StepError::NonFinite);
         }
         let is_free = const { M::CONSTRAINTS.is_empty() };
@@ -194,7 +210,7 @@ where
     T: Tables,
 {
     let Some(last) = memory.last.filter(|last| last.end.is_same(state)) else {
-        parts.momenta.fill(state.p);
+        parts.kept.momenta.fill(state.p);
         parts.unknowns.fill(0.0);
         return false;
     };

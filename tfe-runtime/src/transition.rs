@@ -308,65 +308,41 @@ where
             let place = (last.t, &last.start.q);
             let mut rows = Rows::at_start_again(parts.rows, self.model, place, parts.active);
             let layout = Layout::new(&scheme.element, N, M::CONSTRAINTS.len());
-            let is_combined = rows.is_combined();
-            if is_combined {
-                for place in layout.multipliers() {
-                    rows.combine_multipliers(&mut parts.unknowns[place]);
-                }
-            }
+            rows.combine_multipliers(&layout, parts.unknowns);
             let mut form = ConstrainedForm::new(
-                VelocityForm {
-                    model: self.model,
-                    scheme,
-                    span,
-                    forces: parts.forces,
-                    momenta: parts.momenta,
-                    masses: parts.masses,
-                    mass_pivots: parts.mass_pivots,
-                    constant_mass: &mut memory.mass,
-                    statistics: &mut memory.statistics,
-                },
+                VelocityForm::new(
+                    self.model,
+                    (scheme, span),
+                    parts.kept,
+                    (&mut memory.mass, &mut memory.statistics),
+                ),
                 layout,
                 rows,
                 parts.active,
                 total(impulses, last.h),
             );
-            let x = &*parts.unknowns;
-            let linearised = wanted.of_constrained(&mut form, x, directions, system);
-            if is_combined {
-                for place in layout.multipliers() {
-                    form.constraints
-                        .rows
-                        .declared_multipliers(&mut parts.unknowns[place]);
-                }
-            }
+            let linearised = wanted.of_constrained(&mut form, parts.unknowns, directions, system);
+            form.constraints
+                .rows
+                .restore_multipliers(&layout, parts.unknowns);
             return Ok(linearised?);
         }
         if const { may_be_phase::<M, N>() } && scheme.element.has_phase_form() {
-            let mut equations = PhaseForm {
-                model: self.model,
-                scheme,
-                span,
-                momenta: parts.momenta,
-                velocities: parts.forces,
-                masses: parts.masses,
-                swept: false,
-                statistics: &mut memory.statistics,
-            };
+            let mut equations = PhaseForm::new(
+                self.model,
+                (scheme, span),
+                parts.kept,
+                &mut memory.statistics,
+            );
             system.of_phase(&mut equations, parts.unknowns, directions);
             wanted.of_phase(&equations, parts.unknowns, directions, system)?;
         } else {
-            let mut equations = VelocityForm {
-                model: self.model,
-                scheme,
-                span,
-                forces: parts.forces,
-                momenta: parts.momenta,
-                masses: parts.masses,
-                mass_pivots: parts.mass_pivots,
-                constant_mass: &mut memory.mass,
-                statistics: &mut memory.statistics,
-            };
+            let mut equations = VelocityForm::new(
+                self.model,
+                (scheme, span),
+                parts.kept,
+                (&mut memory.mass, &mut memory.statistics),
+            );
             if wanted.by_iteration(&mut equations, parts.unknowns)? {
                 return Ok(());
             }

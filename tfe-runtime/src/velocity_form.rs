@@ -15,6 +15,7 @@ use crate::model::{First, Model, Second};
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 use crate::unlike::{by_coordinate, own_increment};
+use crate::workspace::Kept;
 
 pub(crate) struct VelocityForm<'a, M, const N: usize> {
     pub(crate) model: &'a M,
@@ -27,6 +28,29 @@ pub(crate) struct VelocityForm<'a, M, const N: usize> {
     /// The LU factors of the mass matrix, where it is constant.
     pub(crate) constant_mass: &'a mut Option<Block<N>>,
     pub(crate) statistics: &'a mut Statistics,
+}
+
+impl<'a, M, const N: usize> VelocityForm<'a, M, N> {
+    /// The equations of one element, on memory of the element and on memory that lasts from step to step.
+    #[inline(always)]
+    pub(crate) fn new(
+        model: &'a M,
+        (scheme, span): (SchemeRef<'a>, Span<'a, N>),
+        kept: Kept<'a, N>,
+        (constant_mass, statistics): (&'a mut Option<Block<N>>, &'a mut Statistics),
+    ) -> Self {
+        Self {
+            model,
+            scheme,
+            span,
+            forces: kept.forces,
+            momenta: kept.momenta,
+            masses: kept.masses,
+            mass_pivots: kept.mass_pivots,
+            constant_mass,
+            statistics,
+        }
+    }
 }
 
 /// The derivatives of a Lagrangian that enter the tangent; `force` is L_q + Q.

@@ -99,6 +99,18 @@ pub const fn linearised_len(
     (2 * coordinates + directions) * m + coordinates * (m + coordinates + directions)
 }
 
+/// What the equations of an element keep from one iteration to the next.
+pub(crate) struct Kept<'a, const N: usize> {
+    /// L_q + Q at the points; in phase form the velocities.
+    pub(crate) forces: &'a mut [[f64; N]],
+    /// The momenta at the points: the initial guesses of the Legendre transform.
+    pub(crate) momenta: &'a mut [[f64; N]],
+    /// The LU factors of the mass matrices of the rows; in phase form H_pp at the stages.
+    pub(crate) masses: &'a mut [f64],
+    /// The row exchanges of these factors.
+    pub(crate) mass_pivots: &'a mut [usize],
+}
+
 /// The workspace divided into its parts.
 pub(crate) struct Parts<'a, const N: usize> {
     /// The unknown rates: U rows; in phase form U rows of forces, then U rows of velocities.
@@ -107,14 +119,10 @@ pub(crate) struct Parts<'a, const N: usize> {
     pub(crate) origin: &'a mut [f64],
     /// Residual or increment.
     pub(crate) step: &'a mut [f64],
-    /// L_q + Q at the points; in phase form the velocities.
-    pub(crate) forces: &'a mut [[f64; N]],
-    /// The momenta at the points: the initial guesses of the Legendre transform.
-    pub(crate) momenta: &'a mut [[f64; N]],
+    /// What the equations of the element keep.
+    pub(crate) kept: Kept<'a, N>,
     /// The contributions of impulses to the rows.
     pub(crate) kicks: &'a mut [[f64; N]],
-    /// The LU factors of the mass matrices of the rows; in phase form H_pp at the stages.
-    pub(crate) masses: &'a mut [f64],
     /// The extrapolation matrix from old to new unknowns; U × U.
     pub(crate) extrapolation: &'a mut [f64],
     /// The rows of constraints.
@@ -122,7 +130,6 @@ pub(crate) struct Parts<'a, const N: usize> {
     /// The tangent of Newton's method, or its LU factors.
     pub(crate) tangent: &'a mut [f64],
     pub(crate) tangent_pivots: &'a mut [usize],
-    pub(crate) mass_pivots: &'a mut [usize],
     /// One for each constraint that is independent of those before it, zero for the others.
     pub(crate) active: &'a mut [usize],
 }
@@ -159,15 +166,17 @@ impl<'a, const N: usize> Parts<'a, N> {
             unknowns,
             origin,
             step,
-            forces: forces.as_chunks_mut().0,
-            momenta: momenta.as_chunks_mut().0,
+            kept: Kept {
+                forces: forces.as_chunks_mut().0,
+                momenta: momenta.as_chunks_mut().0,
+                masses,
+                mass_pivots,
+            },
             kicks: kicks.as_chunks_mut().0,
-            masses,
             extrapolation,
             rows,
             tangent,
             tangent_pivots,
-            mass_pivots,
             active,
         })
     }

@@ -2,6 +2,7 @@
 //! T-132).
 
 use super::constrains::Constrains;
+use super::layout::Layout;
 use super::rows::{
     COMBINED, DEPENDENT, Rows, add_row, dot, has_digits, in_units, longest, norm, scaled,
     scaled_norm, subtract_part, unit,
@@ -279,29 +280,42 @@ impl<const N: usize> Rows<'_, N> {
         }
     }
 
-    /// Converts multipliers of the constraints as declared to those of combined rows, one for each.
-    pub(crate) fn combine_multipliers(&mut self, multipliers: &mut [f64]) {
-        let count = multipliers.len();
-        for place in 0..count {
-            let basis = &self.basis[place * count..(place + 1) * count];
-            let mut sum = 0.0;
-            for c in 0..count {
-                sum += basis[c] * self.lengths[c] * multipliers[c];
-            }
-            self.mu[place] = sum;
+    /// Converts all multipliers of an element from those of the constraints as declared to those of the rows, if these
+    /// are combinations.
+    pub(crate) fn combine_multipliers(&mut self, layout: &Layout, unknowns: &mut [f64]) {
+        if !self.is_combined {
+            return;
         }
-        multipliers.copy_from_slice(self.mu);
+        for multipliers in layout.multipliers() {
+            let multipliers = &mut unknowns[multipliers];
+            let count = multipliers.len();
+            for place in 0..count {
+                let basis = &self.basis[place * count..(place + 1) * count];
+                let mut sum = 0.0;
+                for c in 0..count {
+                    sum += basis[c] * self.lengths[c] * multipliers[c];
+                }
+                self.mu[place] = sum;
+            }
+            multipliers.copy_from_slice(self.mu);
+        }
     }
 
     /// The inverse conversion.
-    pub(crate) fn declared_multipliers(&mut self, multipliers: &mut [f64]) {
-        let count = multipliers.len();
-        for c in 0..count {
-            self.mu[c] = (0..count)
-                .map(|place| self.weights[place * count + c] * multipliers[place])
-                .sum();
+    pub(crate) fn restore_multipliers(&mut self, layout: &Layout, unknowns: &mut [f64]) {
+        if !self.is_combined {
+            return;
         }
-        multipliers.copy_from_slice(self.mu);
+        for multipliers in layout.multipliers() {
+            let multipliers = &mut unknowns[multipliers];
+            let count = multipliers.len();
+            for c in 0..count {
+                self.mu[c] = (0..count)
+                    .map(|place| self.weights[place * count + c] * multipliers[place])
+                    .sum();
+            }
+            multipliers.copy_from_slice(self.mu);
+        }
     }
 }
 
