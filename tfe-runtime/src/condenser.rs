@@ -219,6 +219,7 @@ impl<const N: usize> Condenser<N> {
         directions: &[Direction],
         condensed: Condensed<'_>,
     ) -> Result<(), StepError> {
+        self.check(&placed, directions.len(), &condensed)?;
         let Placed {
             time,
             length,
@@ -226,23 +227,7 @@ impl<const N: usize> Condenser<N> {
             interior,
             damping,
         } = placed;
-        if !(length.is_finite() && length != 0.0) {
-            return Err(StepError::InvalidStep { step: length });
-        }
-        let m = self.interior();
-        let columns = 2 * N + directions.len() + 1;
-        let needed = columns * m.max(2 * N);
-        let given = condensed
-            .response
-            .len()
-            .min(condensed.ends.len() * m.max(2 * N) / (2 * N));
-        if interior.len() != m
-            || condensed.response.len() != columns * m
-            || condensed.ends.len() != 2 * N * columns
-        {
-            return Err(StepError::Workspace { needed, given });
-        }
-        let scheme = self.table.view();
+        let (scheme, m) = (self.table.view(), self.interior());
         self.forces
             .resize(EndForces::<N>::length(m, directions.len()), 0.0);
         let workspace = Workspace {
@@ -251,14 +236,13 @@ impl<const N: usize> Condenser<N> {
         };
         let parts = Parts::of(workspace, &scheme.element, M::FORM, M::CONSTRAINTS.len())?;
         parts.kicks.fill([0.0; N]);
-        let kicks: &[[f64; N]] = parts.kicks;
         let low = State::ZERO;
         let span = Span {
             t: time,
             h: length,
             start,
             low: &low,
-            kicks,
+            kicks: &*parts.kicks,
             damping,
         };
         let mut system = System {
@@ -322,18 +306,32 @@ impl<const N: usize> Condenser<N> {
             .0
         };
         self.memory.statistics.factorizations += 1;
-        let mut sum = 0.0;
-        for (row, value) in end.p.iter().chain(&end.q).enumerate() {
-            let row = &mut ends[row * columns..(row + 1) * columns];
-            row[columns - 1] += value;
-            sum += row.iter().map(|entry| 0.0 * entry).sum::<f64>();
+        add_end(&end, ends)
+    }
+
+    /// Refuses a length that is zero or not finite, and memory of other sizes than a number of directions needs.
+    fn check(
+        &self,
+        placed: &Placed<'_, N>,
+        directions: usize,
+        condensed: &Condensed<'_>,
+    ) -> Result<(), StepError> {
+        let step = placed.length;
+        if !(step.is_finite() && step != 0.0) {
+            return Err(StepError::InvalidStep { step });
         }
-        // Infinities and NaN do not sum to zero.
-        if sum == 0.0 {
-            Ok(())
-        } else {
-            Err(StepError::NonFinite)
+        let m = self.interior();
+        let columns = 2 * N + directions + 1;
+        let Condensed { response, ends } = condensed;
+        if placed.interior.len() == m
+            && response.len() == columns * m
+            && ends.len() == 2 * N * columns
+        {
+            return Ok(());
         }
+        let given = response.len().min(ends.len() * m.max(2 * N) / (2 * N));
+        let needed = columns * m.max(2 * N);
+        Err(StepError::Workspace { needed, given })
     }
 
     /// The polynomial of the element linearised last, from its first node to the node at time `next` with the state
@@ -394,6 +392,28 @@ impl<const N: usize> Condenser<N> {
             &interval,
             None,
         )
+    }
+}
+
+/// Adds the end of the element to the last column.
+///
+/// # Errors
+/// [`StepError::NonFinite`] if an entry is not finite.
+fn add_end<const N: usize>(end: &State<N>, ends: &mut [f64]) -> Result<(), StepError> {
+    let columns = ends.len() / (2 * N);
+    let mut sum = 0.0;
+    for (row, value) in ends
+        .chunks_exact_mut(columns)
+        .zip(end.p.iter().chain(&end.q))
+    {
+        row[columns - 1] += value;
+        sum += row.iter().map(|entry| 0.0 * entry).sum::<f64>();
+    }
+    // Infinities and NaN do not sum to zero.
+    if sum == 0.0 {
+        Ok(())
+    } else {
+        Err(StepError::NonFinite)
     }
 }
 

@@ -9,7 +9,7 @@ use crate::constrained::own::violated;
 use crate::constrained::residual::{largest_gap, relative_residual};
 use crate::constrained::rows::{Independence, Rows, norm};
 use crate::control::START_TOLERANCE;
-use crate::equations::Span;
+use crate::equations::{Span, combination};
 use crate::error::{ConstraintError, StepError};
 use crate::evidence::{Energy, Evidence, conserves_energy, rounding};
 use crate::method::{Interval, Last, Memory, Method, set_kicks, total};
@@ -157,7 +157,7 @@ impl<const N: usize> Step<'_, N> {
         }
         let units = choose(rows, self.model, (self.times.0, &self.start.q), active);
         let rates = self.layout.rates();
-        let mean = mean_rate(&self.scheme, scratch.unknowns[..rates].as_chunks().0);
+        let mean = combination(self.scheme.advance, scratch.unknowns[..rates].as_chunks().0);
         self.combine(rows, (&mean, &units), active);
         if self.warm {
             rows.combine_multipliers(&self.layout, scratch.unknowns);
@@ -334,17 +334,6 @@ fn constant<const N: usize>(layout: &Layout, v: &[f64; N], unknowns: &mut [f64])
     unknowns.fill(0.0);
     unknowns[..layout.rates()].as_chunks_mut().0.fill(*v);
     unknowns[layout.end(0)..layout.node(0)].copy_from_slice(v);
-}
-
-/// The mean of the rates, which are those continued from the last element or a cold start.
-fn mean_rate<const N: usize>(scheme: &SchemeRef<'_>, rates: &[[f64; N]]) -> [f64; N] {
-    let mut mean = [0.0; N];
-    for (weight, rate) in scheme.advance.iter().zip(rates) {
-        for a in 0..N {
-            mean[a] += weight * rate[a];
-        }
-    }
-    mean
 }
 
 /// The velocity at the end of the element, from the polynomial of the rates.

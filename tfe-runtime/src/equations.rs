@@ -101,13 +101,7 @@ impl<const N: usize> Span<'_, N> {
         let v = if scheme.collocated {
             rates[l]
         } else {
-            let mut v = [0.0; N];
-            for (weight, rate) in scheme.velocity[row].iter().zip(rates) {
-                for a in 0..N {
-                    v[a] += weight * rate[a];
-                }
-            }
-            v
+            combination(&scheme.velocity[row], rates)
         };
         (t + scheme.nodes[l] * h, q, v)
     }
@@ -154,6 +148,18 @@ impl<const N: usize> Span<'_, N> {
         };
         Increment { relative, position }
     }
+}
+
+/// Σ weight · row.
+#[inline(always)]
+pub(crate) fn combination<const N: usize>(weights: &[f64], rows: &[[f64; N]]) -> [f64; N] {
+    let mut sum = [0.0; N];
+    for (weight, row) in weights.iter().zip(rows) {
+        for a in 0..N {
+            sum[a] += weight * row[a];
+        }
+    }
+    sum
 }
 
 /// Σ (high + low) · row.

@@ -3,6 +3,7 @@
 
 use crate::condense::{Direction, System};
 use crate::constrained::element::{ConstrainedForm, Derivatives};
+use crate::equations::combination;
 #[cfg(feature = "alloc")]
 use crate::error::ConstraintError;
 use crate::error::StepError;
@@ -27,44 +28,17 @@ pub(crate) fn linearise<'s, M, const N: usize>(
     x: &[f64],
     directions: &[Direction],
     newton_step: bool,
-    system: System<'s>,
+    mut system: System<'s>,
     ends: &mut [f64],
 ) -> Result<&'s [f64], StepError>
 where
     M: Model<N>,
 {
-    let layout = form.constraints.layout;
-    let size = layout.size();
-    let columns = system.sides.len() / size;
-    // The first N columns of the sides hold the derivatives by the coordinates until they are distributed.
-    let (by_start, _) = system.sides.split_at_mut(size * N);
-    form.evaluate(
-        x,
-        system.residual,
-        Some(Derivatives {
-            tangent: system.tangent,
-            by_start,
-        }),
-    )?;
-    for row in (0..size).rev() {
-        let mut by_start = [0.0; N];
-        by_start.copy_from_slice(&system.sides[row * N..(row + 1) * N]);
-        let side = &mut system.sides[row * columns..(row + 1) * columns];
-        side.fill(0.0);
-        for b in 0..N {
-            side[N + b] = -by_start[b];
-        }
-    }
-    for a in 0..N {
-        for i in 0..form.inner.scheme.unknowns() {
-            system.sides[(i * N + a) * columns + a] = 1.0;
-        }
-        system.sides[layout.end(a) * columns + a] = 1.0;
-    }
+    let (layout, scheme) = (form.constraints.layout, form.inner.scheme);
+    let columns = system.sides.len() / layout.size();
+    evaluate_sides(form, x, &mut system)?;
     let end = form.end(x, true)?;
-    let scheme = form.inner.scheme;
-    let h = form.inner.span.h;
-    let rates = x[..layout.rates()].as_chunks::<N>().0;
+    let rate: [f64; N] = combination(scheme.advance, x[..layout.rates()].as_chunks().0);
     ends.fill(0.0);
     for (k, direction) in directions.iter().enumerate() {
         let column = 2 * N + k;
@@ -73,11 +47,7 @@ where
         })?;
         for a in 0..N {
             ends[a * columns + column] = momentum[a];
-            let mut rate = 0.0;
-            for (weight, row) in scheme.advance.iter().zip(rates) {
-                rate += weight * row[a];
-            }
-            ends[(N + a) * columns + column] = direction.length * rate;
+            ends[(N + a) * columns + column] = direction.length * rate[a];
         }
     }
     if newton_step {
@@ -90,7 +60,8 @@ where
     for a in 0..N {
         for (u, weight) in scheme.advance.iter().enumerate() {
             for k in 0..columns {
-                ends[(N + a) * columns + k] += h * weight * sides[(u * N + a) * columns + k];
+                ends[(N + a) * columns + k] +=
+                    form.inner.span.h * weight * sides[(u * N + a) * columns + k];
             }
         }
         ends[(N + a) * columns + N + a] += 1.0;
@@ -112,15 +83,47 @@ where
         let column = 2 * N + k;
         for a in 0..N {
             for b in 0..N {
-                let mut rate = 0.0;
-                for (weight, row) in scheme.advance.iter().zip(rates) {
-                    rate += weight * row[b];
-                }
-                momenta[a * columns + column] -= end.second.zq[a][b] * direction.length * rate;
+                momenta[a * columns + column] -= end.second.zq[a][b] * direction.length * rate[b];
             }
         }
     }
     Ok(sides)
+}
+
+/// Evaluates residual and tangent, and the right-hand sides for the start, (p₀, q₀); the others are set to zero.
+fn evaluate_sides<M, const N: usize>(
+    form: &mut ConstrainedForm<'_, M, N>,
+    x: &[f64],
+    system: &mut System<'_>,
+) -> Result<(), StepError>
+where
+    M: Model<N>,
+{
+    let layout = form.constraints.layout;
+    let size = layout.size();
+    let columns = system.sides.len() / size;
+    // The first N columns of the sides hold the derivatives by the coordinates until they are distributed.
+    let derivatives = Derivatives {
+        tangent: system.tangent,
+        by_start: &mut system.sides[..size * N],
+    };
+    form.evaluate(x, system.residual, Some(derivatives))?;
+    for row in (0..size).rev() {
+        let mut by_start = [0.0; N];
+        by_start.copy_from_slice(&system.sides[row * N..(row + 1) * N]);
+        let side = &mut system.sides[row * columns..(row + 1) * columns];
+        side.fill(0.0);
+        for b in 0..N {
+            side[N + b] = -by_start[b];
+        }
+    }
+    for a in 0..N {
+        for i in 0..form.inner.scheme.unknowns() {
+            system.sides[(i * N + a) * columns + a] = 1.0;
+        }
+        system.sides[layout.end(a) * columns + a] = 1.0;
+    }
+    Ok(())
 }
 
 #[cfg(not(feature = "alloc"))]
@@ -149,115 +152,181 @@ fn along<M, const N: usize>(
 where
     M: Model<N>,
 {
-    let layout = form.constraints.layout;
-    let (scheme, h) = (form.inner.scheme, form.inner.span.h);
-    let (points, unknowns) = (scheme.points(), scheme.unknowns());
-    let parameter = match direction.parameter {
-        None => None,
-        Some(parameter) => {
-            let found = parameter.any(form.inner.model);
-            Some(found.ok_or(ConstraintError::Parameter)?)
-        }
-    };
-    let rates = x[..layout.rates()].as_chunks::<N>().0;
-    let stretch = direction.length / h;
-    let mut rows = DualRows::<N>::new(M::CONSTRAINTS.len());
-    let mut residual = vec![0.0; layout.size()];
-    let mut end_force = [0.0; N];
+    let points = form.inner.scheme.points();
+    let mut along = Along::new(form, x, direction)?;
     for l in 0..points {
-        let (t, q, v) = form.inner.place(l, rates);
-        let node = scheme.nodes[l];
+        along.add_point(l)?;
+    }
+    let start_impulse = along.subtract_start_impulse();
+    let momentum = along.write_end(&start_impulse)?;
+    for (row, value) in along.residual.into_iter().enumerate() {
+        write(row, value);
+    }
+    Ok(momentum)
+}
+
+/// The residual of an element while it moves along a direction.
+#[cfg(feature = "alloc")]
+struct Along<'f, 'a, M, const N: usize> {
+    form: &'f mut ConstrainedForm<'a, M, N>,
+    x: &'f [f64],
+    direction: &'f Direction,
+    parameter: Option<usize>,
+    /// The relative change of the length of the element.
+    stretch: f64,
+    /// The constraints where they were evaluated last.
+    rows: DualRows<N>,
+    residual: Vec<f64>,
+    /// The change of the impulse of all forces.
+    impulse: [f64; N],
+}
+
+#[cfg(feature = "alloc")]
+impl<'f, 'a, M, const N: usize> Along<'f, 'a, M, N>
+where
+    M: Model<N>,
+{
+    fn new(
+        form: &'f mut ConstrainedForm<'a, M, N>,
+        x: &'f [f64],
+        direction: &'f Direction,
+    ) -> Result<Self, StepError> {
+        let parameter = match direction.parameter {
+            None => None,
+            Some(parameter) => {
+                let found = parameter.any(form.inner.model);
+                Some(found.ok_or(ConstraintError::Parameter)?)
+            }
+        };
+        Ok(Self {
+            x,
+            direction,
+            parameter,
+            stretch: direction.length / form.inner.span.h,
+            rows: DualRows::new(M::CONSTRAINTS.len()),
+            residual: vec![0.0; form.constraints.layout.size()],
+            impulse: [0.0; N],
+            form,
+        })
+    }
+
+    fn rates(&self) -> &'f [[f64; N]] {
+        let rates = self.form.constraints.layout.rates();
+        self.x[..rates].as_chunks().0
+    }
+
+    /// Evaluates the constraints, combined as the rows of the element are.
+    fn evaluate_rows(&mut self, time: Dual, q: &[Dual; N], v: &[f64; N]) {
+        let (element, model) = (&self.form.constraints.rows, self.form.inner.model);
+        self.rows.evaluate_like(element, model, (time, q), v);
+    }
+
+    /// Adds the contributions of point l.
+    fn add_point(&mut self, l: usize) -> Result<(), StepError> {
+        let (scheme, h) = (self.form.inner.scheme, self.form.inner.span.h);
+        let (points, unknowns) = (scheme.points(), scheme.unknowns());
+        let (rates, node) = (self.rates(), scheme.nodes[l]);
+        let (t, q, v) = self.form.inner.place(l, rates);
         let weights = &scheme.position[l * unknowns..(l + 1) * unknowns];
-        let (time, q_dual) = moving(direction, node, t, &q, weights, rates);
-        let time = time.by_parameter(parameter);
-        let guess = form.inner.momenta[l];
-        let (mut momentum, mut force) = explicit(form.inner.model, time, &q_dual, &v, &guess)?;
+        let (time, q_dual) = moving(self.direction, node, t, &q, weights, rates);
+        let time = time.by_parameter(self.parameter);
+        let guess = self.form.inner.momenta[l];
+        let (mut momentum, mut force) = explicit(self.form.inner.model, time, &q_dual, &v, &guess)?;
         for a in 0..N {
-            force[a] += direction.damping * v[a];
+            force[a] += self.direction.damping * v[a];
         }
-        rows.evaluate_like(
-            &form.constraints.rows,
-            form.inner.model,
-            (time, &q_dual),
-            &v,
-        );
-        let slopes = legendre_slopes(node, layout.degree());
+        self.evaluate_rows(time, &q_dual, &v);
+        let slopes = legendre_slopes(node, self.form.constraints.layout.degree());
+        self.add_reactions(l, &slopes, (&mut momentum, &mut force));
+        for a in 0..N {
+            let impulse = self.direction.length * self.form.inner.forces[l][a] + h * force[a];
+            self.impulse[a] += scheme.weights[l] * impulse;
+            for i in 0..unknowns {
+                self.residual[i * N + a] += scheme.momentum[i * points + l] * momentum[a]
+                    - scheme.force[i * points + l] * impulse;
+            }
+        }
+        let layout = self.form.constraints.layout;
+        for (c, holonomic) in self.form.constraints.active(M::CONSTRAINTS) {
+            if holonomic {
+                for j in 1..layout.degree() {
+                    self.residual[layout.inside(j, c)] +=
+                        scheme.weights[l] * slopes[j] * self.rows.value_over(c, h, self.stretch);
+                }
+            } else {
+                self.residual[layout.inside(l, c)] = self.rows.psi_slope(c, &v);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds the changes of the reactions at point l, at fixed multipliers.
+    fn add_reactions(
+        &mut self,
+        l: usize,
+        slopes: &[f64],
+        (momentum, force): (&mut [f64; N], &mut [f64; N]),
+    ) {
         for holonomic in [true, false] {
-            form.constraints
-                .set_mu(M::CONSTRAINTS, l, x, &slopes, holonomic);
-            for (c, mu) in form.constraints.rows.mu.iter().enumerate() {
+            let constraints = &mut self.form.constraints;
+            constraints.set_mu(M::CONSTRAINTS, l, self.x, slopes, holonomic);
+            for (c, mu) in constraints.rows.mu.iter().enumerate() {
                 for a in 0..N {
-                    let (row, rate) = (rows.rows[c][a], rows.rates[c][a]);
+                    let (row, rate) = (self.rows.rows[c][a], self.rows.rates[c][a]);
                     if holonomic {
                         force[a] -= row.slope * mu;
                     } else {
                         // μ is h times the unknown.
-                        momentum[a] += (row.slope + row.value * stretch) * mu;
-                        force[a] += (rate.slope + rate.value * stretch) * mu;
+                        momentum[a] += (row.slope + row.value * self.stretch) * mu;
+                        force[a] += (rate.slope + rate.value * self.stretch) * mu;
                     }
                 }
             }
         }
-        for a in 0..N {
-            let impulse = direction.length * form.inner.forces[l][a] + h * force[a];
-            end_force[a] += scheme.weights[l] * impulse;
-            for i in 0..unknowns {
-                residual[i * N + a] += scheme.momentum[i * points + l] * momentum[a]
-                    - scheme.force[i * points + l] * impulse;
+    }
+
+    /// Subtracts the change of the impulse of the constraints at the start, and returns it.
+    fn subtract_start_impulse(&mut self) -> [f64; N] {
+        let span = self.form.inner.span;
+        let still = duals(&span.start.q, &[0.0; N]);
+        let time = Dual::new(span.t, self.direction.time).by_parameter(self.parameter);
+        self.evaluate_rows(time, &still, &[0.0; N]);
+        let constraints = &mut self.form.constraints;
+        constraints.set_node_mu(M::CONSTRAINTS, self.x, true);
+        let impulse = self.rows.stretched(constraints.rows.mu, self.stretch);
+        let rates = constraints.layout.rates();
+        for row in self.residual[..rates].as_chunks_mut::<N>().0 {
+            for a in 0..N {
+                row[a] -= impulse[a];
             }
         }
-        for (c, holonomic) in form.constraints.active(M::CONSTRAINTS) {
+        impulse
+    }
+
+    /// Writes the rows of the end of the element; returns the change of L_v there.
+    fn write_end(&mut self, start_impulse: &[f64; N]) -> Result<[f64; N], StepError> {
+        let (scheme, span) = (self.form.inner.scheme, self.form.inner.span);
+        let (t, q, v) = self.form.constraints.end_place(self.x);
+        let (time, q_dual) = moving(self.direction, 1.0, t, &q, scheme.advance, self.rates());
+        let time = time.by_parameter(self.parameter);
+        let (momentum, _) = explicit(self.form.inner.model, time, &q_dual, &v, &span.start.p)?;
+        self.evaluate_rows(time, &q_dual, &v);
+        let constraints = &mut self.form.constraints;
+        constraints.set_node_mu(M::CONSTRAINTS, self.x, false);
+        let reaction = self.rows.stretched(constraints.rows.mu, self.stretch);
+        let layout = constraints.layout;
+        for a in 0..N {
+            self.residual[layout.end(a)] =
+                momentum[a] + reaction[a] - start_impulse[a] - self.impulse[a];
+        }
+        for (c, holonomic) in constraints.active(M::CONSTRAINTS) {
+            self.residual[layout.node(c)] = self.rows.psi_slope(c, &v);
             if holonomic {
-                for j in 1..layout.degree() {
-                    residual[layout.inside(j, c)] +=
-                        scheme.weights[l] * slopes[j] * rows.value_over(c, h, stretch);
-                }
-            } else {
-                residual[layout.inside(l, c)] = rows.psi_slope(c, &v);
+                self.residual[layout.inside(0, c)] = self.rows.value_over(c, span.h, self.stretch);
             }
         }
+        Ok(momentum)
     }
-    let span = form.inner.span;
-    let still = duals(&span.start.q, &[0.0; N]);
-    let start = Dual::new(span.t, direction.time).by_parameter(parameter);
-    rows.evaluate_like(
-        &form.constraints.rows,
-        form.inner.model,
-        (start, &still),
-        &[0.0; N],
-    );
-    form.constraints.set_node_mu(M::CONSTRAINTS, x, true);
-    let kick = rows.stretched(form.constraints.rows.mu, stretch);
-    for row in residual[..layout.rates()].as_chunks_mut::<N>().0 {
-        for a in 0..N {
-            row[a] -= kick[a];
-        }
-    }
-    let (t, q, v) = form.constraints.end_place(x);
-    let (time, q_dual) = moving(direction, 1.0, t, &q, scheme.advance, rates);
-    let time = time.by_parameter(parameter);
-    let (momentum, _) = explicit(form.inner.model, time, &q_dual, &v, &span.start.p)?;
-    rows.evaluate_like(
-        &form.constraints.rows,
-        form.inner.model,
-        (time, &q_dual),
-        &v,
-    );
-    form.constraints.set_node_mu(M::CONSTRAINTS, x, false);
-    let reaction = rows.stretched(form.constraints.rows.mu, stretch);
-    for a in 0..N {
-        residual[layout.end(a)] = momentum[a] + reaction[a] - kick[a] - end_force[a];
-    }
-    for (c, holonomic) in form.constraints.active(M::CONSTRAINTS) {
-        residual[layout.node(c)] = rows.psi_slope(c, &v);
-        if holonomic {
-            residual[layout.inside(0, c)] = rows.value_over(c, h, stretch);
-        }
-    }
-    for (row, value) in residual.into_iter().enumerate() {
-        write(row, value);
-    }
-    Ok(momentum)
 }
 
 /// A point of the element as a dual number: it moves in time, and in space because the element is stretched.

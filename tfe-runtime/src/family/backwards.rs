@@ -349,9 +349,9 @@ impl<'m, M: Model> Backwards<'m, M> {
             None => Rates::new(view, table.clone(), Control::default())?,
         };
         let transition = TransitionOperator::next(view, &mut rates, ground, before, (t, h));
-        let transition = transition.and_then(|mut transition| {
-            transition.answer(view, &rates, (t, h), directions)?;
-            Ok(transition)
+        let transition = transition.map(|mut transition| {
+            transition.differentiate_along(view, &rates, (t, h), directions);
+            transition
         });
         for (l, point) in rates.points.iter().enumerate() {
             let time = t + h * table.view().nodes[l];

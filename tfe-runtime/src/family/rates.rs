@@ -615,7 +615,8 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
     }
 }
 
-fn product(weights: &[f64], values: &[f64]) -> f64 {
+/// Σ weight · value
+pub(super) fn product(weights: &[f64], values: &[f64]) -> f64 {
     weights.iter().zip(values).map(|(w, value)| w * value).sum()
 }
 

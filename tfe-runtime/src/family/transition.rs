@@ -3,18 +3,19 @@
 mod directions;
 mod error;
 pub(super) mod pull;
+mod respond;
 
 pub use error::OperatorError;
 
 use super::blocked::Blocked;
 use super::dense::{DenseElement, jumps};
 use super::held::Held;
-use super::model::{Block, FamilyState, Gradient, Model};
+use super::model::{FamilyState, Gradient, Model};
 use super::pattern::Pattern;
-use super::projection::{Explicit, Places};
+use super::projection::Places;
 use super::rates::Rates;
 use super::view::View;
-use crate::condense::{Direction, Parameter, add_multiple};
+use crate::condense::{Direction, Parameter};
 use crate::consistency::ModelError;
 use crate::element::Element;
 use crate::error::StepError;
@@ -26,6 +27,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 use nalgebra::DMatrix;
+use respond::OfStart;
 
 /// The derivative of one step of a model of run-time length, (δp₀, δq₀) ↦ (δp₁, δq₁): an operator on 2n numbers,
 /// ordered (p, q).
@@ -88,17 +90,6 @@ impl Ground {
             jumps: jumps.into(),
         }
     }
-}
-
-/// The direct changes in an element. By point and coordinate: q_l, L_v,l and F_l at fixed rates; by coordinate: p₀, and
-/// q₁ − h Σ β ν; and those of the constraints.
-struct Change<'a, S, L, F, P, A> {
-    shift: S,
-    lift: L,
-    push: F,
-    impulse: P,
-    advance: A,
-    explicit: Option<&'a Explicit>,
 }
 
 impl TransitionOperator {
@@ -182,7 +173,7 @@ impl TransitionOperator {
         for (number, ((t, h, state), directions)) in steps.into_iter().enumerate() {
             let transition = Self::next(&view, &mut rates, &ground, state, (t, h));
             let done = transition.and_then(|mut transition| {
-                transition.answer(&view, &rates, (t, h), directions.as_ref())?;
+                transition.differentiate_along(&view, &rates, (t, h), directions.as_ref());
                 each(transition)
             });
             done.map_err(|error| (number, error))?;
@@ -355,14 +346,10 @@ impl TransitionOperator {
 
     /// The change of the end of the step for a change of its start.
     fn respond_to(&self, (p, q): (&[f64], &[f64]), inside: Option<&mut Vec<f64>>) -> Vec<f64> {
-        let explicit = self.held.as_ref().map(|held| held.impulse_of(q));
-        let change = Change {
-            shift: |_, a: usize| q[a],
-            lift: |_, _| 0.0,
-            push: |_, _| 0.0,
-            impulse: |a: usize| p[a],
-            advance: |a: usize| q[a],
-            explicit: explicit.as_ref(),
+        let change = OfStart {
+            p,
+            q,
+            explicit: self.held.as_ref().map(|held| held.impulse_of(q)),
         };
         self.respond_inside(&change, inside)
     }
@@ -379,164 +366,5 @@ impl TransitionOperator {
             unit[column] = 0.0;
         }
         matrix
-    }
-
-    /// The change of the end of the step for direct changes in the element.
-    fn respond<S, L, F, P, A>(&self, change: &Change<'_, S, L, F, P, A>) -> Vec<f64>
-    where
-        S: Fn(usize, usize) -> f64,
-        L: Fn(usize, usize) -> f64,
-        F: Fn(usize, usize) -> f64,
-        P: Fn(usize) -> f64,
-        A: Fn(usize) -> f64,
-    {
-        self.respond_inside(change, None)
-    }
-
-    /// The same, with the coefficients of the polynomials if they are requested.
-    fn respond_inside<S, L, F, P, A>(
-        &self,
-        change: &Change<'_, S, L, F, P, A>,
-        mut inside: Option<&mut Vec<f64>>,
-    ) -> Vec<f64>
-    where
-        S: Fn(usize, usize) -> f64,
-        L: Fn(usize, usize) -> f64,
-        F: Fn(usize, usize) -> f64,
-        P: Fn(usize) -> f64,
-        A: Fn(usize) -> f64,
-    {
-        let scheme = self.table.view();
-        let (n, h) = (self.end.q.len(), self.h);
-        let (count, points) = (scheme.unknowns(), scheme.points());
-        let Change {
-            shift,
-            lift,
-            push,
-            impulse,
-            advance,
-            explicit,
-        } = change;
-        let held = self.held.as_ref();
-        let mut unknowns = vec![0.0; self.matrix.size()];
-        let (rates, multipliers) = unknowns.split_at_mut(n * count);
-        let [mut q, mut v, mut momentum, mut force] =
-            [vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]];
-        for l in 0..points {
-            for a in 0..n {
-                (q[a], momentum[a], force[a]) = (shift(l, a), lift(l, a), push(l, a));
-            }
-            self.bend(l, &q, &v, &mut momentum, &mut force);
-            if let Some(held) = held {
-                held.bend(l, &q, &mut force);
-                held.add_constraint_sides(l, &q, *explicit, (scheme.weights[l], h), multipliers);
-            }
-            for (a, sides) in rates.chunks_exact_mut(count).enumerate() {
-                for (i, side) in sides.iter_mut().enumerate() {
-                    let at = i * points + l;
-                    *side += h * scheme.force[at] * force[a] - scheme.momentum[at] * momentum[a];
-                }
-            }
-        }
-        let mut end: Vec<f64> = (0..n).map(impulse).chain((0..n).map(advance)).collect();
-        let (end_p, end_q) = end.split_at_mut(n);
-        if let Some(held) = held {
-            held.add_end_sides(end_q, *explicit, h, multipliers);
-            held.subtract_impulse(*explicit, end_p);
-        }
-        for (sides, impulse) in rates.chunks_exact_mut(count).zip(&*end_p) {
-            sides.iter_mut().for_each(|side| *side += impulse);
-        }
-        self.matrix.solve(&mut unknowns);
-        let (rates, multipliers) = unknowns.split_at(n * count);
-        let product = |weights: &[f64], a: usize| -> f64 {
-            let rates = &rates[a * count..(a + 1) * count];
-            weights.iter().zip(rates).map(|(w, rate)| w * rate).sum()
-        };
-        if let Some(inside) = &mut inside {
-            inside.clear();
-            for weights in scheme.rate.chunks_exact(count) {
-                inside.extend((0..n).map(|a| h * product(weights, a)));
-            }
-            inside.resize(2 * inside.len(), 0.0);
-        }
-        for l in 0..points {
-            let row = l * count..(l + 1) * count;
-            for a in 0..n {
-                q[a] = shift(l, a) + h * product(&scheme.position[row.clone()], a);
-                v[a] = product(&scheme.velocity[row.clone()], a);
-                (momentum[a], force[a]) = (lift(l, a), push(l, a));
-            }
-            self.bend(l, &q, &v, &mut momentum, &mut force);
-            if let Some(held) = held {
-                held.bend(l, &q, &mut force);
-                held.add_reactions(l, multipliers, &mut force);
-            }
-            for (p, force) in end_p.iter_mut().zip(&force) {
-                *p += h * scheme.weights[l] * force;
-            }
-            let Some(inside) = &mut inside else { continue };
-            let half = inside.len() / 2;
-            let rows = inside[half..].chunks_exact_mut(n.max(1));
-            if held.is_none() {
-                for (row, weights) in rows.zip(scheme.force_rate.chunks_exact(points)) {
-                    add_multiple(row, h * weights[l], &force);
-                }
-                continue;
-            }
-            self.add_inertia(l, &v, &mut momentum);
-            for (row, weights) in rows.zip(self.jumps.chunks_exact(points + 2)) {
-                add_multiple(row, weights[l], &momentum);
-            }
-        }
-        for (a, end) in end_q.iter_mut().enumerate() {
-            *end += h * product(scheme.advance, a);
-        }
-        let Some(held) = held else { return end };
-        held.add_first_multipliers(h, multipliers, end_p);
-        held.project(end_p, end_q, *explicit);
-        if let Some(inside) = inside {
-            let half = inside.len() / 2;
-            let rows = inside[half..].chunks_exact_mut(n.max(1));
-            let start: Vec<f64> = (0..n).map(impulse).collect();
-            for (row, weights) in rows.zip(self.jumps.chunks_exact(points + 2)) {
-                add_multiple(row, weights[points], &start);
-                add_multiple(row, weights[points + 1], end_p);
-            }
-        }
-        end
-    }
-
-    /// Adds L_vv δv at one point.
-    fn add_inertia(&self, l: usize, v: &[f64], momentum: &mut [f64]) {
-        for (block, row, column, value) in self.second(l) {
-            if block == Block::ZZ {
-                momentum[row] += value * v[column];
-            }
-        }
-    }
-
-    /// Adds L_vq δq to `momentum`, F_v δv + F_q δq to `force`, at one point.
-    fn bend(&self, l: usize, q: &[f64], v: &[f64], momentum: &mut [f64], force: &mut [f64]) {
-        for (block, row, column, value) in self.second(l) {
-            match block {
-                Block::ZZ => {}
-                Block::ZQ => {
-                    momentum[row] += value * q[column];
-                    force[column] += value * v[row];
-                }
-                Block::ForceZ => force[row] += value * v[column],
-                // From L_qq, and from forces by coordinates.
-                _ => force[row] += value * q[column],
-            }
-        }
-    }
-
-    /// The second derivatives at one point.
-    fn second(&self, l: usize) -> impl Iterator<Item = (Block, usize, usize, f64)> {
-        let places = self.pattern.places();
-        let values = &self.values[l * places.len()..];
-        let both = places.iter().zip(values);
-        both.map(|((block, row, column), value)| (*block, *row, *column, *value))
     }
 }

@@ -65,13 +65,19 @@ impl<'m, M: Model> View<'m, M> {
     }
 
     /// The effect of a parameter at a place.
-    pub(super) fn by_parameter(&self, t: f64, q: &[f64], v: &[f64], parameter: usize) -> Answer {
+    pub(super) fn by_parameter(
+        &self,
+        t: f64,
+        q: &[f64],
+        v: &[f64],
+        parameter: usize,
+    ) -> PointSlopes {
         let time = Dual::new(t, 0.0).by_parameter(Some(parameter));
-        self.answer(time, q, v)
+        self.by_time(time, q, v)
     }
 
     /// The effect of the time at a place, if the time has a derivative, and of the parameter that it carries.
-    pub(super) fn answer(&self, time: Dual, q: &[f64], v: &[f64]) -> Answer {
+    pub(super) fn by_time(&self, time: Dual, q: &[f64], v: &[f64]) -> PointSlopes {
         let still = |values: &[f64]| -> Vec<Dual> {
             let duals = values.iter().map(|value| Dual::new(*value, 0.0));
             duals.collect()
@@ -104,7 +110,7 @@ impl<'m, M: Model> View<'m, M> {
         let force = force.collect();
         let by_z = z.iter().map(|one| sign * one.slope);
         if !self.is_hamiltonian() {
-            return Answer {
+            return PointSlopes {
                 velocity: vec![0.0; n],
                 momentum: by_z.collect(),
                 force,
@@ -112,7 +118,7 @@ impl<'m, M: Model> View<'m, M> {
         }
         // v = H_p(q, p) is held fixed, so that the momentum changes: δp = −M ∂H_p/∂a.
         let velocity: Vec<f64> = by_z.collect();
-        Answer {
+        PointSlopes {
             momentum: self.momenta(&velocity),
             velocity,
             force,
@@ -135,7 +141,7 @@ impl<'m, M: Model> View<'m, M> {
 }
 
 /// The effect of a parameter, or of the time, at fixed coordinates and velocities.
-pub(super) struct Answer {
+pub(super) struct PointSlopes {
     /// ∂L_v/∂a
     pub(super) momentum: Vec<f64>,
     /// ∂F/∂a at fixed momenta for a Hamiltonian, else at fixed velocities; F = L_q + Q.

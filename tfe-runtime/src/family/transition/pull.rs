@@ -21,36 +21,88 @@ pub(in crate::family) struct Seeds {
     pub(in crate::family) held: Option<Weights>,
 }
 
+/// The weights that a loss gives to the momenta at the points, and to that at the start.
+struct Jumps {
+    momenta: Vec<f64>,
+    start: Vec<f64>,
+}
+
 impl TransitionOperator {
     /// Replaces the row λ of phase space by its product with the derivative, including the derivatives of a loss by the
     /// inside of the element, and returns the weights of the points (T-127).
     pub(in crate::family) fn pull(&self, inside: Option<&InsideLoss>, lambda: &mut [f64]) -> Seeds {
         let scheme = self.table.view();
         let (n, h) = (self.end.q.len(), self.h);
-        let (count, points) = (scheme.unknowns(), scheme.points());
         let within = Within::of(inside, &scheme, h);
         let held = self.held.as_ref();
         let (of_p, of_q) = lambda.split_at_mut(n);
-        // The weights of L_v at the points and of the momentum at the start, through which the polynomial of momenta
-        // with jumps passes.
-        let mut through = vec![0.0; points * n];
-        let mut of_start = vec![0.0; n];
-        if let (Some(_), Some(inside)) = (held, inside) {
-            let rows = inside.coefficients.chunks_exact(n.max(1));
-            let rows = rows.skip(scheme.rates());
-            for (weights, row) in self.jumps.chunks_exact(points + 2).zip(rows) {
-                for (through, weight) in through.chunks_exact_mut(n.max(1)).zip(weights) {
-                    add_multiple(through, *weight, row);
-                }
-                add_multiple(&mut of_start, weights[points], row);
-                add_multiple(of_p, weights[points + 1], row);
+        let jumps = self.pull_jumps(inside.filter(|_| held.is_some()), of_p);
+        let mut weights = held.map(|held| held.pull_projection(of_p, of_q));
+        let mut mu = self.pull_end(&within, &jumps.momenta, (of_p, of_q));
+        self.matrix.solve_transposed(&mut mu);
+        let (rates, multipliers) = mu.split_at(n * scheme.unknowns());
+        let mut by_q = vec![0.0; n];
+        let mut seeds = self.seeds(&within, jumps.momenta, rates, of_p);
+        for l in 0..scheme.points() {
+            let own = l * n..(l + 1) * n;
+            let (momentum, force) = (&seeds.momenta[own.clone()], &seeds.forces[own.clone()]);
+            if let (Some(held), Some(weights)) = (held, &mut weights) {
+                held.bend(l, force, &mut by_q);
+                let scale = (scheme.weights[l], h);
+                held.pull_constraint_sides(l, multipliers, scale, &mut by_q, weights);
             }
+            let by_v = &mut seeds.by_velocities[own];
+            self.bend_back(l, (momentum, force), &mut by_q, by_v);
         }
-        let mut held_weights = held.map(|held| held.pull_projection(of_p, of_q));
-        let mut mu = vec![0.0; self.matrix.size()];
-        let (rates, multipliers) = mu.split_at_mut(n * count);
-        let (mut by_q, mut by_v) = (vec![0.0; n], vec![0.0; n]);
-        for (rates, of_q) in rates.chunks_exact_mut(count).zip(&*of_q) {
+        for (a, mu) in rates.chunks_exact(scheme.unknowns()).enumerate() {
+            of_p[a] += mu.iter().sum::<f64>();
+        }
+        if let (Some(held), Some(weights)) = (held, &mut weights) {
+            held.pull_end_sides(multipliers, h, &mut by_q, weights);
+            held.pull_impulse(of_p, &mut by_q);
+            held.weigh_rows(of_p, &seeds.forces, weights);
+        }
+        add_multiple(of_p, 1.0, &jumps.start);
+        add_multiple(of_q, 1.0, &by_q);
+        seeds.held = weights;
+        seeds
+    }
+
+    /// The weights that a loss inside an element with constraints gives to the momenta through which its polynomial
+    /// passes with jumps; that of the momentum at the end is added to `of_p`.
+    fn pull_jumps(&self, inside: Option<&InsideLoss>, of_p: &mut [f64]) -> Jumps {
+        let scheme = self.table.view();
+        let (n, points) = (self.end.q.len(), scheme.points());
+        let mut jumps = Jumps {
+            momenta: vec![0.0; points * n],
+            start: vec![0.0; n],
+        };
+        let Some(inside) = inside else { return jumps };
+        let rows = inside.coefficients.chunks_exact(n.max(1));
+        let rows = rows.skip(scheme.rates());
+        for (weights, row) in self.jumps.chunks_exact(points + 2).zip(rows) {
+            for (momentum, weight) in jumps.momenta.chunks_exact_mut(n.max(1)).zip(weights) {
+                add_multiple(momentum, *weight, row);
+            }
+            add_multiple(&mut jumps.start, weights[points], row);
+            add_multiple(of_p, weights[points + 1], row);
+        }
+        jumps
+    }
+
+    /// The weights of the rates and multipliers: the right-hand side of the transposed system.
+    fn pull_end(
+        &self,
+        within: &Within,
+        momenta: &[f64],
+        (of_p, of_q): (&[f64], &[f64]),
+    ) -> Vec<f64> {
+        let scheme = self.table.view();
+        let (n, h) = (self.end.q.len(), self.h);
+        let count = scheme.unknowns();
+        let mut sides = vec![0.0; self.matrix.size()];
+        let (rates, multipliers) = sides.split_at_mut(n * count);
+        for (rates, of_q) in rates.chunks_exact_mut(count).zip(of_q) {
             for (rate, advance) in rates.iter_mut().zip(scheme.advance) {
                 *rate = h * advance * of_q;
             }
@@ -60,12 +112,13 @@ impl TransitionOperator {
                 rates[j] += seed;
             }
         }
-        for l in 0..points {
+        let (mut by_q, mut by_v) = (vec![0.0; n], vec![0.0; n]);
+        for l in 0..scheme.points() {
             by_q.fill(0.0);
             by_v.fill(0.0);
-            let momentum = &through[l * n..(l + 1) * n];
+            let momentum = &momenta[l * n..(l + 1) * n];
             let mut force: Vec<f64> = of_p.iter().map(|p| h * scheme.weights[l] * p).collect();
-            match held {
+            match &self.held {
                 None => within.add_forces(l, &mut force),
                 Some(held) => {
                     held.bend(l, &force, &mut by_q);
@@ -82,53 +135,38 @@ impl TransitionOperator {
                 }
             }
         }
-        if let Some(held) = held {
+        if let Some(held) = &self.held {
             held.pull_first_multipliers(h, of_p, multipliers);
         }
-        self.matrix.solve_transposed(&mut mu);
-        let (rates, multipliers) = mu.split_at(n * count);
-        by_q.fill(0.0);
-        let zeros = || vec![0.0; points * n];
-        let mut seeds = Seeds {
-            momenta: through,
-            forces: zeros(),
-            by_velocities: zeros(),
-            held: None,
-        };
+        sides
+    }
+
+    /// The weights of momenta and forces at the points, from those of the rows of the linear system; `momenta` are those
+    /// that they have besides.
+    fn seeds(&self, within: &Within, mut momenta: Vec<f64>, rows: &[f64], of_p: &[f64]) -> Seeds {
+        let scheme = self.table.view();
+        let (n, h, points) = (of_p.len(), self.h, scheme.points());
+        let mut forces = vec![0.0; points * n];
         for l in 0..points {
             let own = l * n..(l + 1) * n;
-            let momentum = &mut seeds.momenta[own.clone()];
-            let force = &mut seeds.forces[own.clone()];
-            for (a, mu) in rates.chunks_exact(count).enumerate() {
+            let (momentum, force) = (&mut momenta[own.clone()], &mut forces[own]);
+            for (a, rows) in rows.chunks_exact(scheme.unknowns()).enumerate() {
                 force[a] = h * scheme.weights[l] * of_p[a];
-                for (i, mu) in mu.iter().enumerate() {
-                    momentum[a] -= scheme.momentum[i * points + l] * mu;
-                    force[a] += h * scheme.force[i * points + l] * mu;
+                for (i, row) in rows.iter().enumerate() {
+                    momentum[a] -= scheme.momentum[i * points + l] * row;
+                    force[a] += h * scheme.force[i * points + l] * row;
                 }
             }
-            let by_v = &mut seeds.by_velocities[own];
-            match (held, &mut held_weights) {
-                (Some(held), Some(weights)) => {
-                    held.bend(l, force, &mut by_q);
-                    let scale = (scheme.weights[l], h);
-                    held.pull_constraint_sides(l, multipliers, scale, &mut by_q, weights);
-                }
-                _ => within.add_forces(l, force),
+            if self.held.is_none() {
+                within.add_forces(l, force);
             }
-            self.bend_back(l, (momentum, force), &mut by_q, by_v);
         }
-        for (a, mu) in rates.chunks_exact(count).enumerate() {
-            of_p[a] += mu.iter().sum::<f64>();
+        Seeds {
+            momenta,
+            forces,
+            by_velocities: vec![0.0; points * n],
+            held: None,
         }
-        if let (Some(held), Some(weights)) = (held, &mut held_weights) {
-            held.pull_end_sides(multipliers, h, &mut by_q, weights);
-            held.pull_impulse(of_p, &mut by_q);
-            held.weigh_rows(of_p, &seeds.forces, weights);
-        }
-        add_multiple(of_p, 1.0, &of_start);
-        add_multiple(of_q, 1.0, &by_q);
-        seeds.held = held_weights;
-        seeds
     }
 
     /// Adds the contributions of the weights of L_v and F at one point to those of coordinates and of velocities.
