@@ -78,6 +78,18 @@ pub(crate) struct Span<'a, const N: usize> {
     pub(crate) damping: f64,
 }
 
+/// What the equations of an element keep from one iteration to the next.
+pub(crate) struct Kept<'a, const N: usize> {
+    /// L_q + Q at the points; in phase form the velocities.
+    pub(crate) forces: &'a mut [[f64; N]],
+    /// The momenta at the points: the initial guesses of the Legendre transform.
+    pub(crate) momenta: &'a mut [[f64; N]],
+    /// The LU factors of the mass matrices of the rows; in phase form H_pp at the stages.
+    pub(crate) masses: &'a mut [f64],
+    /// The row exchanges of these factors.
+    pub(crate) mass_pivots: &'a mut [usize],
+}
+
 /// What follows from rates as unknowns, whatever the model.
 impl<const N: usize> Span<'_, N> {
     /// Time, coordinates and velocities at a point.

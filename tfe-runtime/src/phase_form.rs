@@ -7,13 +7,12 @@
 //!
 //! This form is used for Hamiltonian models on two-field families. The vector of unknowns contains all π, then all κ.
 
-use crate::equations::{Equations, Increment, Span, moved, relative, weighted};
+use crate::equations::{Equations, Increment, Kept, Span, moved, relative, weighted};
 use crate::error::StepError;
 use crate::model::{First, Model, Second};
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 use crate::unlike::{by_coordinate, larger_own, own_increment};
-use crate::workspace::Kept;
 
 pub(crate) struct PhaseForm<'a, M, const N: usize> {
     pub(crate) model: &'a M,

@@ -7,7 +7,7 @@
 //! with v_l = Σ_j E_lj ν_j and q_l = q₀ + h Σ_j C_lj ν_j. Every element solves a Lagrangian in this form, and a
 //! Hamiltonian by way of the pointwise Legendre transform where it has no phase-space form.
 
-use crate::equations::{Equations, Increment, Span};
+use crate::equations::{Equations, Increment, Kept, Span};
 use crate::error::{LegendreError, StepError};
 use crate::legendre::{conjugate, lagrangian_view_from};
 use crate::lu::{Block, factor_block, solve};
@@ -15,7 +15,6 @@ use crate::model::{First, Model, Second};
 use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 use crate::unlike::{by_coordinate, own_increment};
-use crate::workspace::Kept;
 
 pub(crate) struct VelocityForm<'a, M, const N: usize> {
     pub(crate) model: &'a M,

@@ -3,6 +3,7 @@
 use crate::constrained::layout::Layout;
 use crate::constrained::rows::rows_len;
 use crate::element::Element;
+use crate::equations::Kept;
 use crate::error::StepError;
 use crate::model::Form;
 
@@ -97,18 +98,6 @@ pub const fn linearised_len(
     let m = interior_len(&element, form, coordinates, constraints);
     // A right-hand side for each direction, and the derivatives of the momentum at the end.
     (2 * coordinates + directions) * m + coordinates * (m + coordinates + directions)
-}
-
-/// What the equations of an element keep from one iteration to the next.
-pub(crate) struct Kept<'a, const N: usize> {
-    /// L_q + Q at the points; in phase form the velocities.
-    pub(crate) forces: &'a mut [[f64; N]],
-    /// The momenta at the points: the initial guesses of the Legendre transform.
-    pub(crate) momenta: &'a mut [[f64; N]],
-    /// The LU factors of the mass matrices of the rows; in phase form H_pp at the stages.
-    pub(crate) masses: &'a mut [f64],
-    /// The row exchanges of these factors.
-    pub(crate) mass_pivots: &'a mut [usize],
 }
 
 /// The workspace divided into its parts.

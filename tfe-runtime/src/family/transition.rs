@@ -27,7 +27,6 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 use nalgebra::DMatrix;
-use respond::OfStart;
 
 /// The derivative of one step of a model of run-time length, (δp₀, δq₀) ↦ (δp₁, δq₁): an operator on 2n numbers,
 /// ordered (p, q).
@@ -342,16 +341,6 @@ impl TransitionOperator {
         let (p, q) = input.split_at(needed / 2);
         output.copy_from_slice(&self.respond_to((p, q), inside));
         Ok(())
-    }
-
-    /// The change of the end of the step for a change of its start.
-    fn respond_to(&self, (p, q): (&[f64], &[f64]), inside: Option<&mut Vec<f64>>) -> Vec<f64> {
-        let change = OfStart {
-            p,
-            q,
-            explicit: self.held.as_ref().map(|held| held.impulse_of(q)),
-        };
-        self.respond_inside(&change, inside)
     }
 
     /// The whole matrix, 2n × 2n, ordered (p, q); takes 2n applications and 4n² numbers.

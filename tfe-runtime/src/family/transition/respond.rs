@@ -44,10 +44,10 @@ pub(super) trait Change {
 }
 
 /// The start changes: by (δp₀, δq₀).
-pub(super) struct OfStart<'a> {
-    pub(super) p: &'a [f64],
-    pub(super) q: &'a [f64],
-    pub(super) explicit: Option<Explicit>,
+struct OfStart<'a> {
+    p: &'a [f64],
+    q: &'a [f64],
+    explicit: Option<Explicit>,
 }
 
 impl Change for OfStart<'_> {
@@ -75,6 +75,20 @@ pub(super) fn combined(weights: &[f64], rates: &[f64], a: usize) -> f64 {
 }
 
 impl TransitionOperator {
+    /// The change of the end of the step for a change of its start.
+    pub(super) fn respond_to(
+        &self,
+        (p, q): (&[f64], &[f64]),
+        inside: Option<&mut Vec<f64>>,
+    ) -> Vec<f64> {
+        let change = OfStart {
+            p,
+            q,
+            explicit: self.held.as_ref().map(|held| held.impulse_of(q)),
+        };
+        self.respond_inside(&change, inside)
+    }
+
     /// The change of the end of the step for direct changes in the element.
     pub(super) fn respond(&self, change: &impl Change) -> Vec<f64> {
         self.respond_inside(change, None)
