@@ -1,5 +1,6 @@
 //! The whole expansion, from tokens to tokens; it can be read from top to bottom.
 
+mod kernels;
 mod sensitivities;
 mod without_inputs;
 
@@ -9,7 +10,7 @@ use crate::emit::{self, Emitter, Signature};
 use crate::headings::Headings;
 use crate::indices;
 use crate::lengths::Lengths;
-use crate::page::{self, Formulas};
+use crate::page;
 use crate::parameters::Parameters;
 use crate::source_map::SourceMap;
 use crate::{checks, constraint, fallback, family, input, solver, state, variant};
@@ -23,14 +24,6 @@ use tfe_symbolic::expr::input::Affine;
 use tfe_symbolic::expr::ordered::SortedMap;
 use tfe_symbolic::model::declared::{Declared, Form, Observable, names};
 use tfe_symbolic::program::{Program, Request};
-
-/// Kernels with more operations are not compiled a second time for several points at once: that would take longer to
-/// compile than it saves.
-const LANES_LIMIT: usize = 4000;
-
-/// Without optimisation, larger kernels are not compiled for lanes: lanes are then no faster, and for the arm of six
-/// links in space (2600 operations) they take four of nine seconds. The results are the same.
-const UNOPTIMISED_LANES_LIMIT: usize = 500;
 
 /// Expands `#[dynamics(arguments)] item`.
 pub(crate) fn expand(arguments: TokenStream, item: TokenStream) -> TokenStream {
@@ -201,139 +194,14 @@ impl<'a> Kernels<'a> {
         } = self;
         let name = &item.ident;
         let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
-        let nothing = Request::default();
-        let argument = TokenStream::new;
-        let value = Request {
-            value: true,
-            ..nothing
-        };
-        let Controls {
-            parameter: given,
-            argument: give,
-        } = Controls::of(self.declared);
-        let at = Signature {
-            name: "value",
-            parameters: quote!(#given t: R, q: &[R; #dof], z: &[R; #dof]),
-            arguments: quote!(#give t, q, z),
-            inline: false,
-        };
-        let value = self.body_in_parts(value, argument(), &at);
-        let mut parts = value.parts;
-        let (value_statements, value) = (value.statements, value.value);
-        let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
-        let first = Request {
-            first: true,
-            ..nothing
-        };
-        let mass = Request {
-            mass: true,
-            ..first
-        };
-        let second = Request {
-            second: true,
-            ..first
-        };
-        // Linear models are stepped by a matrix, constrained ones by Newton's method: neither evaluates points side by
-        // side.
-        let operations = page::total(&self.derivation.counts(mass));
-        let lanes = self.declared.constraints.is_empty()
-            && !self.derivation.structure().linear
-            && operations <= LANES_LIMIT;
-        let lanes_here = match operations <= UNOPTIMISED_LANES_LIMIT {
-            true => quote!(true),
-            false => quote!(::core::cfg!(not(debug_assertions))),
-        };
-        let [value_doc, first_doc, mass_doc, second_doc] = self.docs();
-        let firsts = |name| Signature {
-            name,
-            parameters: quote!(#given t: R, q: &[R; #dof], z: &[R; #dof], first: &mut __tfe::First<R, #dof>),
-            arguments: quote!(#give t, q, z, first),
-            inline: lanes,
-        };
-        let with = |name, parameter: TokenStream, argument: TokenStream, inline| {
-            let first = firsts(name);
-            let (parameters, arguments) = (first.parameters, first.arguments);
-            Signature {
-                name,
-                parameters: quote!(#parameters, #parameter),
-                arguments: quote!(#arguments, #argument),
-                inline,
-            }
-        };
-        let first = self.body_in_parts(first, argument(), &firsts("first"));
-        let masses = with(
-            "first_and_mass",
-            quote!(zz: &mut [[R; #dof]; #dof]),
-            quote!(zz),
-            lanes,
-        );
-        let mass = self.body_in_parts(mass, argument(), &masses);
-        let seconds = quote!(second: &mut __tfe::Second<R, #dof>);
-        let seconds = with("second", seconds, quote!(second), false);
-        let second = self.body_in_parts(second, quote!(second.), &seconds);
-        parts.extend([first.parts, mass.parts, second.parts]);
-        let (first, mass, second) = (first.statements, mass.statements, second.statements);
-        let parts = (!parts.is_empty()).then(|| {
-            quote! {
-                #[automatically_derived]
-                #[allow(unused_variables, non_snake_case, clippy::too_many_arguments)]
-                impl #impl_generics #name #type_generics #where_clause {
-                    #parts
-                }
-            }
-        });
-        let first_parameters = firsts("first").parameters;
-        let mass_parameters = masses.parameters;
-        let Lengths {
-            constant,
-            statement: lengths,
-        } = Lengths::of(self.declared, item);
-        let [value_name, first_name, mass_name, second_name] =
-            ["energy_function", "first", "first_and_mass", "second"].map(|name| self.kernel(name));
-        let has_inputs = !self.declared.inputs.is_empty();
-        // Those of `Controlled` are written into those of `Model`, which say that they are.
-        let inline = (lanes && has_inputs).then(|| quote!(#[inline(always)]));
-        let firsts_and_masses = match lanes && !has_inputs {
-            false => quote! {
-                #[doc = #first_doc]
-                #inline
-                fn #first_name<R: __tfe::Real>(&self, #first_parameters) {
-                    #lengths
-                    #first
-                }
-
-                #[doc = #mass_doc]
-                #inline
-                fn #mass_name<R: __tfe::Real>(&self, #mass_parameters) {
-                    #lengths
-                    #mass
-                }
-            },
-            true => quote! {
-                const LANES: bool = #lanes_here;
-
-                #[doc = #first_doc]
-                #[inline(always)]
-                fn first_inline<R: __tfe::Real>(&self, #first_parameters) {
-                    #lengths
-                    #first
-                }
-
-                #[doc = #mass_doc]
-                #[inline(always)]
-                fn first_and_mass_inline<R: __tfe::Real>(&self, #mass_parameters) {
-                    #lengths
-                    #mass
-                }
-
-                fn first<R: __tfe::Real>(&self, #first_parameters) {
-                    __tfe::Model::first_inline(self, t, q, z, first);
-                }
-
-                fn first_and_mass<R: __tfe::Real>(&self, #mass_parameters) {
-                    __tfe::Model::first_and_mass_inline(self, t, q, z, first, zz);
-                }
-            },
+        let lanes = self.lanes();
+        let (kernels, parts) = self.energy_kernels(lanes.as_ref());
+        let (observable_names, observables) = self.observables();
+        let (sensitivity_values, first_by) = self.sensitivities();
+        let kernels = quote!(#kernels #observables #first_by);
+        let (kernels, controlled) = match self.declared.inputs.is_empty() {
+            true => (kernels, TokenStream::new()),
+            false => (self.without_inputs(lanes), self.controlled(&kernels)),
         };
         let form = match self.declared.form {
             Form::Lagrangian => quote!(Lagrangian),
@@ -343,63 +211,18 @@ impl<'a> Kernels<'a> {
         let ignorable = page::ignorable(self.derivation, dof);
         let diagonal_mass = page::diagonal_mass(self.derivation);
         let coordinate_name = self.coordinate_name();
-        let (observable_names, observables) = self.observables();
         let names = (self.coordinates.as_slice(), &self.places);
         let constraints = constraint::members(self.declared, self.derivation, names);
         let parameters = self.parameters.members(item);
-        let (sensitivity_values, first_by) = self.sensitivities();
-        let kernels = quote! {
-            #[doc = #value_doc]
-            fn #value_name<R: __tfe::Real>(&self, #given t: R, q: &[R; #dof], z: &[R; #dof]) -> R {
-                #lengths
-                #value_statements
-                #value
-            }
-
-            #firsts_and_masses
-
-            #[doc = #second_doc]
-            fn #second_name<R: __tfe::Real>(
-                &self,
-                #given
-                t: R,
-                q: &[R; #dof],
-                z: &[R; #dof],
-                first: &mut __tfe::First<R, #dof>,
-                second: &mut __tfe::Second<R, #dof>,
-            ) {
-                #lengths
-                #second
-            }
-
-            #observables
-            #first_by
-        };
-        let (kernels, controlled) = match has_inputs {
-            false => (kernels, TokenStream::new()),
-            true => {
-                let names = &self.declared.inputs;
-                let controlled = quote! {
-                    #[automatically_derived]
-                    #[allow(unused, non_snake_case, clippy::too_many_arguments)]
-                    impl #impl_generics __tfe::Controlled<#dof> for #name #type_generics #where_clause {
-                        const INPUTS: &'static [&'static str] = &[#(#names),*];
-
-                        #kernels
-                    }
-                };
-                let lanes = lanes.then_some(lanes_here);
-                (self.without_inputs(lanes), controlled)
-            }
-        };
         let check = checks::member(self.declared);
+        let lengths = Lengths::of(self.declared, item).constant;
         let of_deprecated = input::of_deprecated(item);
         quote! {
             #of_deprecated
             const _: () = {
                 use #path::__private as __tfe;
 
-                #constant
+                #lengths
 
                 #[automatically_derived]
                 #[allow(unused, non_snake_case)]
@@ -427,49 +250,23 @@ impl<'a> Kernels<'a> {
         }
     }
 
-    fn kernel(&self, name: &str) -> Ident {
-        controls::kernel(self.declared, name)
+    /// `impl Controlled<N> for Name`: the kernels of a model with inputs.
+    fn controlled(&self, kernels: &TokenStream) -> TokenStream {
+        let (name, dof, names) = (&self.item.ident, &self.dof, &self.declared.inputs);
+        let (impl_generics, type_generics, where_clause) = self.item.generics.split_for_impl();
+        quote! {
+            #[automatically_derived]
+            #[allow(unused, non_snake_case, clippy::too_many_arguments)]
+            impl #impl_generics __tfe::Controlled<#dof> for #name #type_generics #where_clause {
+                const INPUTS: &'static [&'static str] = &[#(#names),*];
+
+                #kernels
+            }
+        }
     }
 
-    /// A line for each kernel: value, first derivatives, those with the mass matrix, all.
-    fn docs(&self) -> [String; 4] {
-        let nothing = Request::default();
-        let first = Request {
-            first: true,
-            ..nothing
-        };
-        let Formulas {
-            value,
-            first: firsts,
-            mass,
-            second,
-            ..
-        } = Formulas::of(self.declared, self.derivation);
-        let all = [
-            (
-                value,
-                Request {
-                    value: true,
-                    ..nothing
-                },
-            ),
-            (firsts.clone(), first),
-            (
-                format!("{firsts}, and {mass}"),
-                Request {
-                    mass: true,
-                    ..first
-                },
-            ),
-            (
-                format!("{firsts}, {second}"),
-                Request {
-                    second: true,
-                    ..first
-                },
-            ),
-        ];
-        all.map(|(formula, request)| page::kernel(&formula, &self.derivation.program(request)))
+    fn kernel(&self, name: &str) -> Ident {
+        controls::kernel(self.declared, name)
     }
 
     fn coordinate_name(&self) -> TokenStream {

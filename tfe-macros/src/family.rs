@@ -202,35 +202,25 @@ impl Kernels<'_> {
     fn implementation(&self, item: &ItemStruct, path: &TokenStream) -> TokenStream {
         let name = &item.ident;
         let (impl_generics, type_generics, where_clause) = item.generics.split_for_impl();
-        let nothing = Request::default();
-        let value = Request {
-            value: true,
-            ..nothing
-        };
         let formulas = Formulas::of(self.declared, self.derivation);
-        let value_doc = page::kernel(&formulas.value, &self.program(value));
-        let value = self.sensitive_body(&self.program(value), Given::Nothing);
+        let value = self.program(Request::VALUE);
+        let value_doc = page::kernel(&formulas.value, &value);
+        let value = self.sensitive_body(&value, Given::Nothing);
         let (value_statements, value) = (value.statements, value.value);
         let value = value.unwrap_or_else(|| quote!(t.like(0.0)));
-        let first = Request {
-            first: true,
-            ..nothing
-        };
-        let mass = Request {
+        let first = self.program(Request::FIRST);
+        let first_doc = page::kernel(&formulas.first, &first);
+        let first = self.sensitive_body(&first, Given::First).statements;
+        let mass = self.program(Request {
             mass: true,
-            ..nothing
-        };
-        let second = Request {
-            second: true,
-            ..first
-        };
-        let first_doc = page::kernel(&formulas.first, &self.program(first));
-        let mass_doc = page::kernel(&formulas.mass, &self.program(mass));
+            ..Request::default()
+        });
+        let mass_doc = page::kernel(&formulas.mass, &mass);
+        let mass = self.body(&mass, Given::Nothing).statements;
+        let second = self.program(Request::SECOND);
         let seconds = format!("{}, {}", formulas.first, formulas.second);
-        let second_doc = page::kernel(&seconds, &self.program(second));
-        let first = self
-            .sensitive_body(&self.program(first), Given::First)
-            .statements;
+        let second_doc = page::kernel(&seconds, &second);
+        let second = self.body(&second, Given::First).statements;
         let forces = self.derivation.forces();
         let assigns = self.strides(&forces).filter(|strides| strides.assigns);
         let assigns = assigns.map(|_| {
@@ -241,8 +231,6 @@ impl Kernels<'_> {
         let in_strides = self.in_strides(&forces);
         let forces_doc = page::kernel(&formulas.forces, &forces);
         let forces = self.body(&forces, Given::Forces).statements;
-        let mass = self.body(&self.program(mass), Given::Nothing).statements;
-        let second = self.body(&self.program(second), Given::First).statements;
         let form = match self.declared.form {
             Form::Lagrangian => quote!(Lagrangian),
             Form::Hamiltonian => quote!(Hamiltonian),

@@ -283,26 +283,12 @@ mod tests {
         }
     }
 
-    const FIRST: Request = Request {
-        value: false,
-        first: true,
-        mass: false,
-        second: false,
-        observables: false,
-        constraint_values: false,
-        constraint_rows: false,
-        constraint_second: false,
-    };
-
     #[test]
     fn results_are_told_by_the_names_of_coordinates() {
         let henon_heiles = "coordinates(x, y), momenta(px, py), \
              hamiltonian = (px^2 + py^2)/2 + (x^2 + y^2)/2 + lambda*(x^2*y - y^3/3)";
-        headings(henon_heiles, FIRST, &["∂H/∂x", "∂H/∂y"]);
-        let second = Request {
-            second: true,
-            ..FIRST
-        };
+        headings(henon_heiles, Request::FIRST, &["∂H/∂x", "∂H/∂y"]);
+        let second = Request::SECOND;
         headings(
             henon_heiles,
             second,
@@ -318,6 +304,6 @@ mod tests {
     #[test]
     fn one_group_needs_no_heading() {
         let pendulum = "coordinates(x), lagrangian = lambda*dot(x)^2/2 + cos(x)";
-        headings(pendulum, FIRST, &[]);
+        headings(pendulum, Request::FIRST, &[]);
     }
 }

@@ -39,19 +39,9 @@ struct Kernels {
 impl Kernels {
     fn of(derivation: &Derivation) -> Self {
         Self {
-            value: derivation.counts(Request {
-                value: true,
-                ..Request::default()
-            }),
-            first: derivation.counts(Request {
-                first: true,
-                ..Request::default()
-            }),
-            second: derivation.counts(Request {
-                first: true,
-                second: true,
-                ..Request::default()
-            }),
+            value: derivation.counts(Request::VALUE),
+            first: derivation.counts(Request::FIRST),
+            second: derivation.counts(Request::SECOND),
         }
     }
 }

@@ -16,22 +16,6 @@ use tfe_symbolic::syntax::context::{Context, Field, FieldKind, Length};
 /// The declarations are read from the bench, so that both are always the same.
 const MODELS: &str = include_str!("../../benches/kernels/models.rs");
 
-const FIRST: Request = Request {
-    value: false,
-    first: true,
-    mass: false,
-    second: false,
-    observables: false,
-    constraint_values: false,
-    constraint_rows: false,
-    constraint_second: false,
-};
-
-const SECOND: Request = Request {
-    second: true,
-    ..FIRST
-};
-
 /// The name of a struct and its declaration.
 fn models() -> Vec<(String, Declared)> {
     let mut found = Vec::new();
@@ -78,7 +62,7 @@ fn models() -> Vec<(String, Declared)> {
 
 /// Weighted operations of the first derivatives, and of the second ones.
 fn operations(derivation: &Derivation) -> [usize; 2] {
-    [FIRST, SECOND].map(|request| derivation.counts(request).weighted())
+    [Request::FIRST, Request::SECOND].map(|request| derivation.counts(request).weighted())
 }
 
 fn main() -> ExitCode {

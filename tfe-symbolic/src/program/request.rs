@@ -21,6 +21,43 @@ pub struct Request {
     pub constraint_second: bool,
 }
 
+impl Request {
+    const NOTHING: Self = Self {
+        value: false,
+        first: false,
+        mass: false,
+        second: false,
+        observables: false,
+        constraint_values: false,
+        constraint_rows: false,
+        constraint_second: false,
+    };
+
+    /// The energy function alone.
+    pub const VALUE: Self = Self {
+        value: true,
+        ..Self::NOTHING
+    };
+
+    /// First derivatives and forces alone.
+    pub const FIRST: Self = Self {
+        first: true,
+        ..Self::NOTHING
+    };
+
+    /// The same with the mass matrix.
+    pub const FIRST_AND_MASS: Self = Self {
+        mass: true,
+        ..Self::FIRST
+    };
+
+    /// First and second derivatives.
+    pub const SECOND: Self = Self {
+        second: true,
+        ..Self::FIRST
+    };
+}
+
 /// By what the first derivatives and forces are differentiated once more, at fixed (q, z).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum By {
