@@ -8,15 +8,16 @@ use std::ops::ControlFlow;
 use tfe_runtime::Share;
 use tfe_runtime::transition::TransitionError;
 
-/// An element that a run has passed.
+/// An element that a run has passed, or a piece of one that events have cut.
 pub struct Passed<'a, const N: usize, L: Length<N> = FixedLength> {
-    pub(super) start: f64,
+    pub(super) t: f64,
     /// The start from which the times of points are counted: a few ulps beside it if a break is at an end.
     pub(super) begin: f64,
     pub(super) h: f64,
     pub(super) before: &'a L::State,
     /// The state at the end, before impulses there.
     pub(super) after: &'a L::State,
+    pub(super) has_impulses: bool,
 }
 
 /// An observer of a run.

@@ -104,7 +104,7 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Matrices<'m, M, N> {
         stepper: &mut Stepper<'m, M, N>,
         passed: &Passed<'_, N>,
     ) -> Result<(), TransitionError> {
-        self.begin(passed.start, passed.before);
+        self.begin(passed.t, passed.before);
         if self.is_across {
             self.tangents.passed(stepper, passed)?;
             self.close();

@@ -56,17 +56,6 @@ pub(super) fn planned<const N: usize>(
     })
 }
 
-/// A piece that was solved and not cut by an event.
-pub(super) struct Piece<'a, const N: usize, L: Length<N> = FixedLength> {
-    pub(super) start: f64,
-    /// The start from which the times of points are counted.
-    pub(super) begin: f64,
-    pub(super) h: f64,
-    pub(super) before: &'a L::State,
-    pub(super) after: &'a L::State,
-    pub(super) has_impulses: bool,
-}
-
 /// Which side of an event a node is on.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
@@ -85,7 +74,7 @@ pub(super) trait Observe<'m, M: 'm, const N: usize, L: Length<N> = FixedLength>:
     fn keeps(&self) -> bool;
 
     /// Called after a piece that was not cut.
-    fn whole(&mut self, _stepper: &L::Stepper<'m, M>, _piece: &Piece<'_, N, L>) {}
+    fn whole(&mut self, _stepper: &L::Stepper<'m, M>, _passed: &Passed<'_, N, L>) {}
 
     /// Called with the polynomial of a piece if [`keeps`](Self::keeps).
     fn inside(&mut self, _dense: L::Polynomial) {}
@@ -312,24 +301,15 @@ where
     ) -> Result<(), RunErrorKind> {
         let Planned { t, h, begin, .. } = *piece;
         let passed = Passed {
-            start: t,
+            t,
             begin,
             h,
             before,
             after,
+            has_impulses: !piece.impulses.is_empty(),
         };
         piece.followed(observer.passed(stepper, &passed))?;
-        observer.whole(
-            stepper,
-            &Piece {
-                start: t,
-                begin,
-                h,
-                before,
-                after,
-                has_impulses: !piece.impulses.is_empty(),
-            },
-        );
+        observer.whole(stepper, &passed);
         Ok(())
     }
 }

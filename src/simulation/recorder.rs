@@ -3,7 +3,7 @@
 use super::events::Severed;
 use super::follow::{Follow, Follower, Passed};
 use super::kind::Simulated;
-use super::pieces::{Broken, Observe, Piece, Side};
+use super::pieces::{Broken, Observe, Side};
 use super::resolution::Resolution;
 use super::setup::Simulation;
 use super::watch::{Recorded, Watch};
@@ -246,8 +246,8 @@ where
         self.record.every == 1
     }
 
-    fn whole(&mut self, stepper: &L::Stepper<'m, M>, piece: &Piece<'_, N, L>) {
-        self.resolution.look_at(stepper, piece);
+    fn whole(&mut self, stepper: &L::Stepper<'m, M>, passed: &Passed<'_, N, L>) {
+        self.resolution.look(M::statistics(stepper), passed);
     }
 
     fn inside(&mut self, dense: L::Polynomial) {

@@ -1,8 +1,8 @@
 //! Checks whether elements resolve the motion: some of those whose iteration did not contract quickly are compared with
 //! shorter elements (T-121).
 
+use super::follow::Passed;
 use super::kind::{Chosen, Simulated};
-use super::pieces::Piece;
 use crate::length::Length;
 use crate::motion::Warning;
 use std::fmt;
@@ -89,16 +89,6 @@ pub struct Again<'m, M: 'm> {
     pub(super) chosen: Chosen,
 }
 
-/// An element that the run has solved.
-pub struct Examined<'a, const N: usize, L: Length<N>> {
-    pub(super) t: f64,
-    /// The start from which the times of points are counted.
-    pub(super) begin: f64,
-    pub(super) h: f64,
-    pub(super) before: &'a L::State,
-    pub(super) after: &'a L::State,
-}
-
 /// The states of the shorter elements and of the run, at the same time.
 #[derive(Clone, Debug)]
 struct StatePair<S> {
@@ -150,43 +140,29 @@ where
         &self.again.chosen
     }
 
-    /// Compares a piece if it is due, unless impulses act in it.
-    pub(super) fn look_at(&mut self, stepper: &L::Stepper<'m, M>, piece: &Piece<'_, N, L>) {
-        if !piece.has_impulses {
-            let examined = Examined {
-                t: piece.start,
-                begin: piece.begin,
-                h: piece.h,
-                before: piece.before,
-                after: piece.after,
-            };
-            self.look(M::statistics(stepper), examined);
-        }
-    }
-
-    /// Compares the element if it is due.
+    /// Compares the element if it is due, unless impulses act in it.
     #[inline(always)]
-    pub(super) fn look(&mut self, statistics: &Statistics, examined: Examined<'_, N, L>) {
-        if self.again.chosen.control.solve == Solve::Trusting {
+    pub(super) fn look(&mut self, statistics: &Statistics, passed: &Passed<'_, N, L>) {
+        if passed.has_impulses || self.again.chosen.control.solve == Solve::Trusting {
             return;
         }
         // Parts of such an element have lost digits of their length, or are of length zero.
-        if !(examined.h / f64::from(MAX_PARTS)).is_normal() {
+        if !(passed.h / f64::from(MAX_PARTS)).is_normal() {
             return;
         }
-        if let Some(asked) = self.comparisons.asked(statistics, &examined) {
-            self.compare(asked, &examined);
+        if let Some(asked) = self.comparisons.asked(statistics, passed) {
+            self.compare(asked, passed);
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn compare(&mut self, asked: Asked, examined: &Examined<'_, N, L>) {
+    fn compare(&mut self, asked: Asked, passed: &Passed<'_, N, L>) {
         let (again, stepper) = (&self.again, &mut self.stepper);
         let mut advance = |element: (f64, f64), state: &mut L::State| {
             Self::advance(again, stepper, element, state)
         };
-        self.comparisons.compare(asked, examined, &mut advance);
+        self.comparisons.compare(asked, passed, &mut advance);
     }
 
     /// Advances a state over an element with the stepper of comparisons. One that has failed is not used again.
@@ -292,8 +268,8 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
     }
 
     /// Counts the element; returns the comparison that it asks for.
-    fn asked(&mut self, statistics: &Statistics, examined: &Examined<'_, N, L>) -> Option<Asked> {
-        let coordinates = L::parts(examined.before).0.as_ref().len();
+    fn asked(&mut self, statistics: &Statistics, passed: &Passed<'_, N, L>) -> Option<Asked> {
+        let coordinates = L::parts(passed.before).0.as_ref().len();
         let compared = self.found.compared.len();
         let asked = self.choice.asked(statistics, coordinates, compared);
         (asked.is_due || self.continued.is_some()).then_some(asked)
@@ -304,18 +280,18 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
     fn compare(
         &mut self,
         Asked { is_due, parts }: Asked,
-        examined: &Examined<'_, N, L>,
+        passed: &Passed<'_, N, L>,
         advance: &mut Advance<'_, L::State>,
     ) {
         // Not after an action, which changes the state.
-        let continued = |continued: &StatePair<L::State>| continued.run == *examined.before;
+        let continued = |continued: &StatePair<L::State>| continued.run == *passed.before;
         if let Some(continued) = self.continued.take().filter(continued) {
-            self.compare_from(continued.state, parts, examined, advance);
+            self.compare_from(continued.state, parts, passed, advance);
         }
         if is_due {
-            self.found.extend(halves::<N, L>(examined.before));
-            let end = self.compare_from(examined.before.clone(), parts, examined, advance);
-            let run = examined.after.clone();
+            self.found.extend(halves::<N, L>(passed.before));
+            let end = self.compare_from(passed.before.clone(), parts, passed, advance);
+            let run = passed.after.clone();
             self.continued = end.map(|state| StatePair { state, run });
         }
     }
@@ -325,12 +301,12 @@ impl<const N: usize, L: Length<N>> Comparisons<N, L> {
         &mut self,
         start: L::State,
         parts: u32,
-        examined: &Examined<'_, N, L>,
+        passed: &Passed<'_, N, L>,
         advance: &mut Advance<'_, L::State>,
     ) -> Option<L::State> {
-        let Examined {
+        let Passed {
             t, begin, h, after, ..
-        } = *examined;
+        } = *passed;
         let end = self.end_of_parts((begin, h), parts, start, advance);
         let reached = end.as_ref().map(halves::<N, L>);
         let off = off(reached, halves::<N, L>(after));

@@ -312,9 +312,9 @@ impl<'m, M: Model<N>, const N: usize> Follow<'m, M, N> for Tangents<'m, M, N> {
         passed: &Passed<'_, N>,
     ) -> Result<(), TransitionError> {
         let Across { end, inside, .. } = self.across(stepper, &[])?;
-        self.count_from(passed.start, passed.before);
+        self.count_from(passed.t, passed.before);
         if self.carried.keeps_inside() {
-            let times = (passed.start, passed.start + passed.h);
+            let times = (passed.t, passed.t + passed.h);
             let along = self.along(stepper, times, inside);
             self.carried.keep(along, None);
         }

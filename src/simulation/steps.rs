@@ -1,10 +1,10 @@
 //! The endless sequence of nodes of a run.
 
-use super::follow::Follow;
+use super::follow::{Follow, Passed};
 use super::kind::Simulated;
 use super::mesh::in_order;
-use super::pieces::{Left, Observe, Piece, Pieces, Planned, Side};
-use super::resolution::{Again, Examined, Resolution};
+use super::pieces::{Left, Observe, Pieces, Planned, Side};
+use super::resolution::{Again, Resolution};
 use super::sequence::ElementSequence;
 use super::times::Endless;
 use super::watch::{Recorded, Watch};
@@ -272,16 +272,15 @@ where
             None => return Some(Err(RunErrorKind::panicked(t))),
         };
         velocity.clone_from(&node.v);
-        if !has_impulses {
-            let examined = Examined {
-                t,
-                begin: element.begin,
-                h: element.h,
-                before: &before,
-                after: state,
-            };
-            self.resolution.look(M::statistics(stepper), examined);
-        }
+        let passed = Passed {
+            t,
+            begin: element.begin,
+            h: element.h,
+            before: &before,
+            after: state,
+            has_impulses,
+        };
+        self.resolution.look(M::statistics(stepper), &passed);
         let is_conserved = !has_impulses && M::CONSERVES;
         let recorded = Recorded::of(&**model, &node, is_conserved);
         self.watch.pass(recorded, &|| model.rounding_at(&node));
@@ -434,8 +433,8 @@ where
         false
     }
 
-    fn whole(&mut self, stepper: &L::Stepper<'m, M>, piece: &Piece<'_, N, L>) {
-        self.resolution.look_at(stepper, piece);
+    fn whole(&mut self, stepper: &L::Stepper<'m, M>, passed: &Passed<'_, N, L>) {
+        self.resolution.look(M::statistics(stepper), passed);
     }
 
     fn changed(&mut self, model: &Share<'m, M>, _: &[(usize, f64)]) {

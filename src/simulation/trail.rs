@@ -322,7 +322,7 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M>
         _: &mut family::Stepper<'m, M>,
         passed: &Passed<'_, 0, RunTimeLength>,
     ) -> Result<(), TransitionError> {
-        let at = (passed.start, passed.h);
+        let at = (passed.t, passed.h);
         self.check_kick(at, passed.before)?;
         self.add_kick(at, passed.begin);
         if self.reacts() {
@@ -332,7 +332,7 @@ impl<'m, M: family::Model + 'm> Follow<'m, M, 0, RunTimeLength> for Trail<'m, M>
             number: self.reached,
             t: passed.begin,
             h: passed.h,
-            nodes: (passed.start, passed.start + passed.h),
+            nodes: (passed.t, passed.t + passed.h),
             before: passed.before.clone(),
             after: passed.after.clone(),
             moves: (self.is_moved, false),
