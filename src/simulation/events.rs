@@ -2,6 +2,7 @@
 
 pub(super) mod act;
 mod clear;
+mod evaluate;
 mod locate;
 pub(super) mod model;
 pub(super) mod on;
@@ -23,12 +24,10 @@ use act::{Act, After, Event, On};
 use clear::Clear;
 use model::EventModel;
 use remaining::{Crossed, Remaining};
-use search::ZeroProof;
 use searched::Searched;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::fmt;
-use std::mem;
 use tfe_runtime::dual::Dual;
 use tfe_runtime::enclosure::Enclosure;
 use tfe_runtime::step::Impulse;
@@ -115,6 +114,12 @@ impl<'a, const N: usize, L: Length<N>> Passage<'a, N, L> {
             before: self.before,
             impulses: self.impulses,
         }
+    }
+
+    /// The distance below which two times in the element are equal.
+    fn resolution(&self) -> f64 {
+        let (start, end) = (self.t, self.t + self.h);
+        4.0 * f64::EPSILON * start.abs().max(end.abs()).max(self.h.abs())
     }
 
     /// The time at a distance from the start of the element; that of a node if they differ by rounding only.
@@ -252,70 +257,23 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
         run: &mut dyn Searched<N, L>,
         arc: &Passage<'_, N, L>,
     ) -> Result<Option<Cut<N, L>>, RunErrorKind> {
-        let Passage { t, h, dense, .. } = *arc;
         self.recorded.clear();
-        if self.stays_off(run, dense) {
+        if self.stays_off(run, arc.dense) {
             return Ok(None);
         }
-        let model = run.model();
-        let resolution = 4.0 * f64::EPSILON * t.abs().max((t + h).abs()).max(h.abs());
-        let samples = (2 * dense.degree()).clamp(8, 24);
-        let value = |tau: f64, row: &mut Vec<f64>| {
-            let time = t + tau * h;
-            if 0.0 < tau && tau < 1.0 {
-                let state = dense.at_time(time);
-                let v = self.velocity_inside(dense, time, &state);
-                self.outputs(model, (time, &state, &v), row);
-                return;
-            }
-            let state = if tau == 0.0 { arc.before } else { arc.after };
-            let (q, _) = L::parts(state);
-            if !self.needs_velocity {
-                self.outputs(model, (time, state, &L::zero(q)), row);
-                return;
-            }
-            // The end of one element and the start of the next are the same node.
-            let time = if tau == 0.0 { t } else { dense.end() };
-            let v = model.velocity(time, state, &L::zero(q));
-            let v = v.unwrap_or_else(|| L::unknown(q));
-            self.outputs(model, (time, state, &v), row);
-        };
-        let mut course = |function, part| self.course(run, dense, function, part);
-        let roundings = self.roundings(model, (t, arc.before));
-        let found = search::crossings(
-            (&self.seen.sides, &roundings),
-            samples,
-            resolution / h.abs(),
-            &value,
-            &mut course,
-        );
-        let undefined = found.undefined;
+        let resolution = arc.resolution();
+        let found = self.crossings(run, arc, resolution);
         let mut remaining = Remaining::new(found.roots, found.sides);
-        let mut is_begun: Vec<bool> = self.seen.sides.iter().map(|side| *side != 0.0).collect();
         if self.has_impacts() {
-            let mut rows = [Vec::new(), Vec::new()];
-            value(0.0, &mut rows[0]);
-            value(1.0, &mut rows[1]);
-            self.check_impacts(&remaining, &rows, t + h)?;
+            let rows = [0.0, 1.0].map(|tau| self.row_at(run.model(), arc, tau));
+            self.check_impacts(&remaining, &rows, arc.t + arc.h)?;
         }
-        while let Some(root) = remaining.first() {
-            let crossed = Crossed::from(&root);
-            if !self.counts(crossed) {
-                remaining.take(root.function);
-                continue;
-            }
-            let met = self.located(run, arc, &root, resolution);
-            // If the run begins on a zero, the polynomial may first move to the wrong side, by less than its error.
-            let begins = !mem::replace(&mut is_begun[root.function], true);
-            if begins && (met.time == arc.t || self.begins_wrongly(run, arc, &root, resolution)) {
-                remaining.take(root.function);
-                continue;
-            }
-            let (root, met) = self.earliest(run, arc, &remaining, (root, met), resolution);
-            if self.is_seen_again(run.model(), arc, &root, met.time) {
-                remaining.take(root.function);
-                continue;
-            }
+        let mut is_begun: Vec<bool> = self.seen.sides.iter().map(|side| *side != 0.0).collect();
+        loop {
+            let waiting = (&mut remaining, &mut is_begun[..]);
+            let Some((root, met)) = self.next_event(run, arc, waiting, resolution) else {
+                break;
+            };
             let meeting = self.meeting(arc, &remaining, (&root, &met), resolution);
             for number in 0..meeting.together.len() {
                 let crossed = meeting.together[number];
@@ -336,8 +294,26 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
             }
         }
         self.seen.sides = remaining.into_sides();
-        self.note_undefined(&undefined, |tau| t + tau * h);
+        self.note_undefined(&found.undefined, |tau| arc.t + tau * arc.h);
         Ok(None)
+    }
+
+    /// The changes of sign of the watched functions on the polynomial of an element.
+    fn crossings(
+        &self,
+        run: &dyn Searched<N, L>,
+        arc: &Passage<'_, N, L>,
+        resolution: f64,
+    ) -> search::Crossings {
+        let model = run.model();
+        let roundings = self.roundings(model, (arc.t, arc.before));
+        search::crossings(
+            (&self.seen.sides, &roundings),
+            (2 * arc.dense.degree()).clamp(8, 24),
+            resolution / arc.h.abs(),
+            &|tau, row| self.write_row_at(model, arc, tau, row),
+            &mut |function, part| self.course(run, arc.dense, function, part),
+        )
     }
 
     /// Applies the action at an event that ends an element of a given length; `None` if it was only recorded.
@@ -487,95 +463,5 @@ impl<'m, const N: usize, L: Length<N>> Events<'m, N, L> {
 
     fn has_functions(&self) -> bool {
         self.watched.iter().any(Watched::is_function)
-    }
-
-    /// The velocity inside an element; zero if no watched function needs it.
-    fn velocity_inside(&self, dense: &L::Polynomial, time: f64, state: &L::State) -> L::Vector {
-        if self.needs_velocity {
-            dense.velocity_at_time(time)
-        } else {
-            let (q, _) = L::parts(state);
-            L::zero(q)
-        }
-    }
-
-    /// The values of the watched functions.
-    fn row(&self, model: &dyn EventModel<N, L>, place: (f64, &L::State, &L::Vector)) -> Vec<f64> {
-        let mut row = Vec::with_capacity(self.watched.len());
-        self.outputs(model, place, &mut row);
-        row
-    }
-
-    /// Writes the values of the watched functions.
-    fn outputs(
-        &self,
-        model: &dyn EventModel<N, L>,
-        (t, state, v): (f64, &L::State, &L::Vector),
-        row: &mut Vec<f64>,
-    ) {
-        let mut values = self.rooms.values.borrow_mut();
-        model.outputs(t, L::parts(state), v, &mut values);
-        let (q, _) = L::parts(state);
-        row.extend(self.watched.iter().map(|watched| match &watched.value {
-            Value::Column(column) => values[*column],
-            Value::Function(function) => function(t, q, v),
-        }));
-    }
-
-    /// Whether bounds prove that no watched function vanishes in an element. Signs that were unknown are then known.
-    fn stays_off(&mut self, run: &dyn Searched<N, L>, dense: &L::Polynomial) -> bool {
-        if self.has_functions() {
-            return false;
-        }
-        for piece in dense.pieces() {
-            let mut values = self.rooms.bounds.borrow_mut();
-            run.outputs_along(piece, &mut values);
-            for (watched, known) in self.watched.iter().zip(&mut self.seen.sides) {
-                let Value::Column(column) = watched.value else {
-                    return false;
-                };
-                let side = values[column].side();
-                if side == 0.0 || *known == -side {
-                    return false;
-                }
-                *known = side;
-            }
-        }
-        true
-    }
-
-    /// What bounds prove about a watched function in a part of an element.
-    fn course(
-        &self,
-        run: &dyn Searched<N, L>,
-        dense: &L::Polynomial,
-        function: usize,
-        part: (f64, f64),
-    ) -> ZeroProof {
-        let Value::Column(column) = self.watched[function].value else {
-            return ZeroProof::Unbounded;
-        };
-        let length = dense.end() - dense.start();
-        // The piece that contains the whole part, if there is one.
-        let place = |piece: &L::Polynomial| {
-            let from = (piece.start() - dense.start()) / length;
-            let to = (piece.end() - dense.start()) / length;
-            ((part.0 - from) / (to - from), (part.1 - from) / (to - from))
-        };
-        let holds = |(from, to): &(f64, f64)| *from >= 0.0 && *to <= 1.0;
-        let mut pieces = dense.pieces().iter().map(|piece| (piece, place(piece)));
-        let Some((piece, within)) = pieces.find(|(_, within)| holds(within)) else {
-            return ZeroProof::Unproved;
-        };
-        let mut values = self.rooms.slopes.borrow_mut();
-        run.outputs_over(piece, within, &mut values);
-        let Dual { value, slope, .. } = values[column];
-        if value.side() != 0.0 || slope.side() != 0.0 {
-            ZeroProof::AtMostOne
-        } else if value == Enclosure::WHOLE {
-            ZeroProof::Unbounded
-        } else {
-            ZeroProof::Unproved
-        }
     }
 }

@@ -73,6 +73,37 @@ impl<const N: usize, L: Length<N>> Events<'_, N, L> {
         self.watched[function].on.crossing.counts(rises)
     }
 
+    /// The next of the remaining roots that is an event, with the end of the element that meets it. Roots before it are
+    /// taken out. `is_begun` tells for each function whether its sign is known or a root was seen.
+    pub(super) fn next_event(
+        &self,
+        run: &mut dyn Searched<N, L>,
+        arc: &Passage<'_, N, L>,
+        (remaining, is_begun): (&mut Remaining, &mut [bool]),
+        resolution: f64,
+    ) -> Option<(Root, Met<N, L>)> {
+        loop {
+            let root = remaining.first()?;
+            if !self.counts(Crossed::from(&root)) {
+                remaining.take(root.function);
+                continue;
+            }
+            let met = self.located(run, arc, &root, resolution);
+            // If the run begins on a zero, the polynomial may first move to the wrong side, by less than its error.
+            let begins = !std::mem::replace(&mut is_begun[root.function], true);
+            if begins && (met.time == arc.t || self.begins_wrongly(run, arc, &root, resolution)) {
+                remaining.take(root.function);
+                continue;
+            }
+            let (root, met) = self.earliest(run, arc, remaining, (root, met), resolution);
+            if self.is_seen_again(run.model(), arc, &root, met.time) {
+                remaining.take(root.function);
+                continue;
+            }
+            return Some((root, met));
+        }
+    }
+
     /// The first event by nodes: the given one, or one whose function has already changed its sign at that node
     /// although its root on the polynomial comes later.
     pub(super) fn earliest(
