@@ -38,10 +38,6 @@ enum Stop {
 impl Search<'_> {
     /// Classifies the parts between all candidates, and collects the points where the class changes.
     pub(super) fn verdict(&mut self, range: &Range<f64>) -> Result<Verdict, Failure> {
-        /// Interior points of a part, which decide by majority: one of them may hit a tangency.
-        const INTERIOR: [f64; 3] = [0.3, 0.5, 0.75];
-        /// Samples closer than this to a candidate, relative to the part, are ignored.
-        const MARGIN: f64 = 1e-3;
         let candidates = self.candidates()?;
         let (Some(first), Some(last)) = (self.samples.first(), self.samples.last()) else {
             return Ok(Verdict {
@@ -49,70 +45,32 @@ impl Search<'_> {
                 changes: Vec::new(),
             });
         };
-        let ends: Vec<f64> = [first.at]
-            .into_iter()
-            .chain(candidates.iter().map(|c| c.at))
-            .chain([last.at])
-            .collect();
-
-        let mut probes: Vec<(Sample, bool)> = Vec::new();
-        for piece in ends.windows(2) {
-            let (start, width) = (piece[0], piece[1] - piece[0]);
-            if width <= SAME_ROOT * piece[0].abs().max(piece[1].abs()) {
-                continue;
+        let inner = candidates.iter().map(|candidate| candidate.at);
+        let ends: Vec<f64> = ([first.at].into_iter().chain(inner).chain([last.at])).collect();
+        let mut classified = Vec::new();
+        for part in ends.windows(2) {
+            if part[1] - part[0] > SAME_ROOT * part[0].abs().max(part[1].abs()) {
+                classified.extend(self.classified(part[0]..part[1])?);
             }
-            let mut interior = Vec::with_capacity(INTERIOR.len());
-            for at in INTERIOR.map(|fraction| start + fraction * width) {
-                let next = self
-                    .samples
-                    .partition_point(|sample| sample.at < at)
-                    .min(self.samples.len() - 1);
-                let scale = Rc::clone(&self.samples[next].scale);
-                if at != 0.0 {
-                    interior.push(self.sample(at, &scale)?);
-                }
-            }
-            let verdicts: Vec<bool> = interior
-                .iter()
-                .filter_map(|sample| self.is_unstable(sample, MIN_EXCESS))
-                .collect();
-            let unstable = verdicts.iter().filter(|&&unstable| unstable).count();
-            let margin = start + MARGIN * width..piece[1] - MARGIN * width;
-            let sampled = self
-                .samples
-                .iter()
-                .filter(|sample| margin.contains(&sample.at));
-            let mut here: Vec<(Sample, bool)> = sampled
-                .filter_map(|sample| Some((sample.clone(), self.is_unstable(sample, MIN_EXCESS)?)))
-                .collect();
-            if !verdicts.is_empty() {
-                let majority = 2 * unstable > verdicts.len();
-                here.extend(interior.into_iter().map(|sample| (sample, majority)));
-            }
-            here.sort_by(|a, b| a.0.at.total_cmp(&b.0.at));
-            probes.extend(here);
         }
-
         let mut changes = Vec::new();
-        for pair in probes.windows(2) {
+        for pair in classified.windows(2) {
             let [(left, left_unstable), (right, right_unstable)] = pair else {
                 continue;
             };
             if left_unstable == right_unstable {
                 continue;
             }
-            let between = candidates
-                .iter()
-                .find(|c| c.is_root && left.at < c.at && c.at < right.at);
-            changes.push(match between {
+            let is_between = |c: &&Candidate| c.is_root && left.at < c.at && c.at < right.at;
+            changes.push(match candidates.iter().find(is_between) {
                 Some(root) => root.at,
                 None => self.bisect(left, right, *left_unstable)?,
             });
         }
-        let unstable_at_start = probes.first().is_some_and(|&(_, unstable)| unstable);
+        let unstable_at_start = classified.first().is_some_and(|&(_, unstable)| unstable);
         // The samples are needed again for the largest radius.
-        self.samples
-            .extend(probes.into_iter().map(|(sample, _)| sample));
+        let samples = classified.into_iter().map(|(sample, _)| sample);
+        self.samples.extend(samples);
         self.samples.sort_by(|a, b| a.at.total_cmp(&b.at));
         self.samples.dedup_by(|a, b| a.at == b.at);
         changes.retain(|&at| range.start < at && at < range.end);
@@ -120,6 +78,39 @@ impl Search<'_> {
             unstable_at_start,
             changes: without_slivers(changes),
         })
+    }
+
+    /// Samples of a part between two candidates, in ascending order, each with whether it is unstable.
+    fn classified(&mut self, part: Range<f64>) -> Result<Vec<(Sample, bool)>, Failure> {
+        /// Interior points of a part, which decide by majority: one of them may hit a tangency.
+        const INTERIOR: [f64; 3] = [0.3, 0.5, 0.75];
+        /// Samples closer than this to a candidate, relative to the part, are ignored.
+        const MARGIN: f64 = 1e-3;
+        let Range { start, end } = part;
+        let width = end - start;
+        let mut interior = Vec::with_capacity(INTERIOR.len());
+        for at in INTERIOR.map(|fraction| start + fraction * width) {
+            let next = self.samples.partition_point(|sample| sample.at < at);
+            let scale = Rc::clone(&self.samples[next.min(self.samples.len() - 1)].scale);
+            if at != 0.0 {
+                interior.push(self.sample(at, &scale)?);
+            }
+        }
+        let verdicts: Vec<bool> = (interior.iter())
+            .filter_map(|sample| self.is_unstable(sample, MIN_EXCESS))
+            .collect();
+        let inside = start + MARGIN * width..end - MARGIN * width;
+        let mut classified: Vec<(Sample, bool)> = (self.samples.iter())
+            .filter(|sample| inside.contains(&sample.at))
+            .filter_map(|sample| Some((sample.clone(), self.is_unstable(sample, MIN_EXCESS)?)))
+            .collect();
+        if !verdicts.is_empty() {
+            let unstable = verdicts.iter().filter(|&&unstable| unstable).count();
+            let majority = 2 * unstable > verdicts.len();
+            classified.extend(interior.into_iter().map(|sample| (sample, majority)));
+        }
+        classified.sort_by(|a, b| a.0.at.total_cmp(&b.0.at));
+        Ok(classified)
     }
 
     /// Finds by bisection where the class changes between two samples, where no function changes its sign.

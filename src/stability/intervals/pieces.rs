@@ -36,6 +36,46 @@ pub(super) struct Piece {
     before: Vec<f64>,
 }
 
+impl Piece {
+    fn width(&self) -> f64 {
+        self.end - self.start
+    }
+
+    fn middle(&self) -> f64 {
+        f64::midpoint(self.start, self.end)
+    }
+
+    /// The two parts in which interpolants are tried next; `None` for pieces that are short, or magnified.
+    fn halves(&self, interpolants: &[Interpolant]) -> Option<[Self; 2]> {
+        let Self {
+            start, end, zoom, ..
+        } = *self;
+        if zoom > 0 || self.width() <= SHORTEST * start.abs().max(end.abs()) {
+            return None;
+        }
+        let before: Vec<f64> = interpolants.iter().map(|one| one.relative).collect();
+        let middle = start + SPLIT * self.width();
+        Some([(start, middle), (middle, end)].map(|(start, end)| Self {
+            start,
+            end,
+            zoom,
+            before: before.clone(),
+        }))
+    }
+
+    /// A smaller piece about a critical point; `None` if it would contain zero, where the matrix may not exist.
+    fn magnified(&self, at: f64, range: &Range<f64>) -> Option<Self> {
+        let half = 0.5 * MAGNIFICATION * self.width();
+        let (start, end) = ((at - half).max(range.start), (at + half).min(range.end));
+        (start * end > 0.0 && start < end).then(|| Self {
+            start,
+            end,
+            zoom: self.zoom + 1,
+            before: Vec::new(),
+        })
+    }
+}
+
 /// Pieces that grow with the distance from zero, on both sides, so that the parameter varies by a moderate ratio in
 /// each.
 fn first(start: f64, end: f64) -> Vec<Piece> {
@@ -89,6 +129,28 @@ struct Interpolant {
     is_resolved: bool,
 }
 
+impl Interpolant {
+    /// Whether the value at a critical point is so small that it may be a double root.
+    fn is_small(&self, at: f64) -> bool {
+        self.series.evaluate(at).abs() <= MAGNIFY_BELOW * self.largest
+    }
+
+    /// The critical points that may separate roots of the function with this number: not those whose values are far from
+    /// zero and have the sign of the samples beside them.
+    fn critical_points(&self, function: usize, samples: &[Sample]) -> Vec<f64> {
+        let mut points = self.series.critical_points(self.error);
+        points.retain(|&at| {
+            let value = self.series.evaluate(at);
+            let after = samples[..=DEGREE]
+                .partition_point(|sample| sample.at <= at)
+                .clamp(1, DEGREE);
+            let flips = |sample: &Sample| (sample.functions[function] > 0.0) != (value > 0.0);
+            self.is_small(at) || flips(&samples[after - 1]) || flips(&samples[after])
+        });
+        points
+    }
+}
+
 impl<'m> Search<'m> {
     /// Samples the range until every function is resolved.
     pub(super) fn over(matrix: Matrix<'m>, range: &Range<f64>) -> Result<Self, Failure> {
@@ -123,113 +185,60 @@ impl Search<'_> {
         range: &Range<f64>,
         waiting: &mut Vec<Piece>,
     ) -> Result<(), Failure> {
-        /// The points at which the interpolant is compared with the function.
-        const CHECKS: [f64; 2] = [0.1371, 0.8193];
-        let Piece {
-            start,
-            end,
-            zoom,
-            before,
-        } = piece;
-        let width = end - start;
-        let matrices = points(start, end)
-            .into_iter()
-            .chain(CHECKS.map(|fraction| start + fraction * width))
-            .map(|at| Ok((at, self.matrix_at(at)?)))
-            .collect::<Result<Vec<_>, _>>()?;
-        let scale = Rc::new(scale_of(
-            matrices.iter().map(|(_, matrix)| matrix),
-            self.size,
-        ));
-        let mut samples = Vec::with_capacity(matrices.len());
-        for (at, matrix) in matrices {
-            let (functions, radius) = self
-                .measure
-                .of(&matrix)
-                .ok_or(IntervalError::Eigenvalues { at })?;
-            samples.push(Sample {
-                at,
-                matrix,
-                scale: Rc::clone(&scale),
-                functions,
-                radius,
-            });
-        }
-
+        let samples = self.samples_on(&piece)?;
         let count = samples[0].functions.len();
         let interpolants: Vec<Interpolant> = (0..count)
             .map(|function| {
-                let before = before.get(function).copied().unwrap_or(f64::INFINITY);
-                self.interpolant(&samples, function, before)
+                let before = piece.before.get(function).copied();
+                self.interpolant(&samples, function, before.unwrap_or(f64::INFINITY))
             })
             .collect();
-        if interpolants
-            .iter()
-            .any(|interpolant| !interpolant.is_resolved)
-        {
-            let middle = start + SPLIT * width;
-            if zoom == 0 && width > SHORTEST * start.abs().max(end.abs()) {
-                let before: Vec<f64> = interpolants
-                    .iter()
-                    .map(|interpolant| interpolant.relative)
-                    .collect();
-                waiting.push(Piece {
-                    start,
-                    end: middle,
-                    zoom,
-                    before: before.clone(),
-                });
-                waiting.push(Piece {
-                    start: middle,
-                    end,
-                    zoom,
-                    before,
-                });
+        if !interpolants.iter().all(|one| one.is_resolved) {
+            if let Some(halves) = piece.halves(&interpolants) {
+                waiting.extend(halves);
                 return Ok(());
             }
-            self.touches.push(f64::midpoint(start, end));
+            self.touches.push(piece.middle());
             self.samples.extend(samples);
             return Ok(());
         }
-
+        let scale = Rc::clone(&samples[0].scale);
         let mut is_magnified = false;
         for (function, interpolant) in interpolants.iter().enumerate() {
-            for at in interpolant.series.critical_points(interpolant.error) {
-                let value = interpolant.series.evaluate(at);
-                let is_small = value.abs() <= MAGNIFY_BELOW * interpolant.largest;
-                // A critical value of the same sign as its neighbours, and far from zero, does not separate roots.
-                let after = samples[..=DEGREE]
-                    .partition_point(|sample| sample.at <= at)
-                    .clamp(1, DEGREE);
-                let flips = |sample: &Sample| (sample.functions[function] > 0.0) != (value > 0.0);
-                if !is_small && !flips(&samples[after - 1]) && !flips(&samples[after]) {
-                    continue;
-                }
+            for at in interpolant.critical_points(function, &samples) {
                 let critical = self.sample(at, &scale)?;
                 self.samples.push(critical);
-                if is_small && zoom < MAGNIFICATIONS {
+                if !interpolant.is_small(at) {
+                    continue;
+                }
+                if piece.zoom < MAGNIFICATIONS {
                     is_magnified = true;
-                    let half = 0.5 * MAGNIFICATION * width;
-                    let zoomed = ((at - half).max(range.start), (at + half).min(range.end));
-                    // Not across zero, where the matrix may not exist.
-                    if zoomed.0 * zoomed.1 > 0.0 && zoomed.0 < zoomed.1 {
-                        waiting.push(Piece {
-                            start: zoomed.0,
-                            end: zoomed.1,
-                            zoom: zoom + 1,
-                            before: Vec::new(),
-                        });
-                    }
-                } else if is_small {
+                    waiting.extend(piece.magnified(at, range));
+                } else {
                     self.touches.push(at);
                 }
             }
         }
-        if zoom > 0 && !is_magnified {
-            self.touches.push(f64::midpoint(start, end));
+        if piece.zoom > 0 && !is_magnified {
+            self.touches.push(piece.middle());
         }
         self.samples.extend(samples);
         Ok(())
+    }
+
+    /// Samples at the Chebyshev points of a piece, and then at two points at which interpolants are compared with the
+    /// functions.
+    fn samples_on(&mut self, piece: &Piece) -> Result<Vec<Sample>, Failure> {
+        const CHECKS: [f64; 2] = [0.1371, 0.8193];
+        let Piece { start, end, .. } = *piece;
+        let checks = CHECKS.map(|fraction| start + fraction * (end - start));
+        let matrices = (points(start, end).into_iter().chain(checks))
+            .map(|at| Ok((at, self.matrix_at(at)?)))
+            .collect::<Result<Vec<_>, _>>()?;
+        let all = matrices.iter().map(|(_, matrix)| matrix);
+        let scale = Rc::new(scale_of(all, self.size));
+        let sample = |(at, matrix)| self.sample_of(at, matrix, &scale);
+        matrices.into_iter().map(sample).collect()
     }
 
     /// The interpolant of a function through the first samples, compared with the function at the last ones.

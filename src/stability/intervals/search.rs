@@ -84,6 +84,16 @@ impl<'m> Search<'m> {
 
     pub(super) fn sample(&mut self, at: f64, scale: &Rc<DMatrix<f64>>) -> Result<Sample, Failure> {
         let matrix = self.matrix_at(at)?;
+        self.sample_of(at, matrix, scale)
+    }
+
+    /// The sample of a matrix that was evaluated.
+    pub(super) fn sample_of(
+        &self,
+        at: f64,
+        matrix: DMatrix<f64>,
+        scale: &Rc<DMatrix<f64>>,
+    ) -> Result<Sample, Failure> {
         let (functions, radius) = self
             .measure
             .of(&matrix)
