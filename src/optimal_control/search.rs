@@ -4,9 +4,10 @@ use super::condensed::Condensed;
 use super::correction::Step;
 use super::curvature::Descent;
 use super::problem::{Evaluation, Iterate, Problem};
-use crate::assembly::size;
+use crate::assembly::{Chain, size};
 use crate::numbers::{larger, largest};
 use nalgebra::DVector;
+use std::mem;
 
 /// One iteration of the search.
 ///
@@ -109,6 +110,46 @@ const PROMISED: f64 = 0.5;
 /// The largest number of times that the distance from a stationary point is halved or doubled.
 const DISTANCES: usize = 128;
 
+/// What a search keeps from one iteration to the next.
+struct Search {
+    evaluation: Evaluation,
+    /// The weights of the merit function.
+    weights: Vec<DVector<f64>>,
+    /// The evaluations before, with the largest merit of which a step is compared.
+    past: Vec<Evaluation>,
+    /// The last correction.
+    last: f64,
+    /// The number of stationary points that were left, and the element in which the change began that left the last one.
+    departures: usize,
+    left: Option<usize>,
+}
+
+impl Search {
+    fn new(evaluation: Evaluation) -> Self {
+        Self {
+            evaluation,
+            weights: Vec::new(),
+            past: Vec::new(),
+            last: f64::INFINITY,
+            departures: 0,
+            left: None,
+        }
+    }
+
+    fn is_round_off(&self, correction: f64) -> bool {
+        self.last < ROUND_OFF && correction >= 0.25 * self.last
+    }
+
+    /// Continues from the end of a step.
+    fn pass(&mut self, correction: f64, next: Evaluation) {
+        self.past.push(mem::replace(&mut self.evaluation, next));
+        if self.past.len() > MEMORY {
+            self.past.remove(0);
+        }
+        self.last = correction;
+    }
+}
+
 impl Problem<'_> {
     /// The size of the correction relative to the iterate.
     pub(super) fn size(&self, step: &Step, condensed: &[Condensed], iterate: &Iterate) -> f64 {
@@ -150,89 +191,96 @@ impl Problem<'_> {
         history: &mut Vec<Iteration>,
     ) -> Result<(), Failure> {
         let mut chain = self.chain();
-        let mut evaluation = self.evaluate(iterate);
-        let mut weights: Vec<DVector<f64>> = Vec::new();
-        let mut past: Vec<Evaluation> = Vec::new();
-        let mut last = f64::INFINITY;
-        let (mut departures, mut left): (usize, Option<usize>) = (0, None);
+        let mut search = Search::new(self.evaluate(iterate));
         loop {
-            let condensed = self.linearise(iterate);
-            let condensed = condensed.map_err(|element| Failure::Undefined { element })?;
-            let gap = self.gap(&evaluation, iterate);
-            let mut outcome = Err(Failure::Singular);
-            let scale = self.scale(&condensed);
-            for (share, weight) in MODELS {
-                let model = (share, weight * scale);
-                let Some(step) = self.step(&mut chain, &condensed, iterate, model) else {
-                    continue;
-                };
-                let correction = self.size(&step, &condensed, iterate);
-                let mut note = Iteration {
-                    cost: evaluation.cost,
-                    gap,
-                    correction,
-                    fraction: 1.0,
-                    curvature: share,
-                };
-                let is_round_off = last < ROUND_OFF && correction >= 0.25 * last;
-                if correction <= control.tolerance || is_round_off {
-                    iterate.add(1.0, &step.change);
-                    self.tell(control, history, note);
-                    let is_last =
-                        departures == DEPARTURES || history.len() >= control.max_iterations;
-                    let Some((element, there)) = self.leave(iterate, correction, is_last)? else {
-                        return Ok(());
-                    };
-                    if control.progress {
-                        eprintln!(
-                            "no minimum: left along a change that begins in element {element}"
-                        );
-                    }
-                    evaluation = there;
-                    // The search starts anew, so earlier merits no longer count.
-                    past.clear();
-                    weights.clear();
-                    last = f64::INFINITY;
-                    departures += 1;
-                    left = Some(element);
-                    outcome = Ok(());
-                    break;
-                }
-                if !(step.curvature >= MIN_CURVATURE * step.of_cost.abs()) {
-                    continue;
-                }
-                let Some(margin) = margin(&step, &evaluation) else {
-                    continue;
-                };
-                outcome = Err(Failure::Stalled { correction });
-                if history.len() >= control.max_iterations {
-                    break;
-                }
-                raise(&mut weights, &step.rows, margin);
-                let Some((fraction, next)) = self.shortened(
-                    iterate,
-                    &step,
-                    (&evaluation, &past),
-                    &weights,
-                    (correction, if share > 0.0 { SHORT } else { SHORTEST }),
-                ) else {
-                    continue;
-                };
-                note.fraction = fraction;
-                self.tell(control, history, note);
-                past.push(std::mem::replace(&mut evaluation, next));
-                if past.len() > MEMORY {
-                    past.remove(0);
-                }
-                last = correction;
-                outcome = Ok(());
-                break;
-            }
-            outcome.map_err(|failure| match (failure, left) {
+            let done = self.improve(&mut search, &mut chain, iterate, (control, history));
+            let is_minimum = done.map_err(|failure| match (failure, search.left) {
                 (Failure::Singular, Some(element)) => Failure::NoMinimum { element },
                 _ => failure,
             })?;
+            if is_minimum {
+                return Ok(());
+            }
         }
+    }
+
+    /// One iteration: a step of the first quadratic model with which the merit decreases. Returns whether the iterate is
+    /// a minimum.
+    fn improve(
+        &self,
+        search: &mut Search,
+        chain: &mut Chain,
+        iterate: &mut Iterate,
+        (control, history): (Control, &mut Vec<Iteration>),
+    ) -> Result<bool, Failure> {
+        let condensed = self.linearise(iterate);
+        let condensed = condensed.map_err(|element| Failure::Undefined { element })?;
+        let gap = self.gap(&search.evaluation, iterate);
+        let scale = self.scale(&condensed);
+        let mut failure = Failure::Singular;
+        for (share, weight) in MODELS {
+            let Some(step) = self.step(chain, &condensed, iterate, (share, weight * scale)) else {
+                continue;
+            };
+            let correction = self.size(&step, &condensed, iterate);
+            let mut note = Iteration {
+                cost: search.evaluation.cost,
+                gap,
+                correction,
+                fraction: 1.0,
+                curvature: share,
+            };
+            if correction <= control.tolerance || search.is_round_off(correction) {
+                iterate.add(1.0, &step.change);
+                self.tell(control, history, note);
+                let is_last = history.len() >= control.max_iterations;
+                return self.is_minimum(search, iterate, correction, (control, is_last));
+            }
+            if !(step.curvature >= MIN_CURVATURE * step.of_cost.abs()) {
+                continue;
+            }
+            let Some(margin) = margin(&step, &search.evaluation) else {
+                continue;
+            };
+            failure = Failure::Stalled { correction };
+            if history.len() >= control.max_iterations {
+                break;
+            }
+            raise(&mut search.weights, &step.rows, margin);
+            let shortest = if share > 0.0 { SHORT } else { SHORTEST };
+            if let Some((fraction, next)) =
+                self.shortened(iterate, &step, search, (correction, shortest))
+            {
+                note.fraction = fraction;
+                self.tell(control, history, note);
+                search.pass(correction, next);
+                return Ok(false);
+            }
+        }
+        Err(failure)
+    }
+
+    /// Whether a stationary point is a minimum. If it is not, the search begins anew beside it.
+    fn is_minimum(
+        &self,
+        search: &mut Search,
+        iterate: &mut Iterate,
+        correction: f64,
+        (control, is_last): (Control, bool),
+    ) -> Result<bool, Failure> {
+        let is_last = is_last || search.departures == DEPARTURES;
+        let Some((element, evaluation)) = self.leave(iterate, correction, is_last)? else {
+            return Ok(true);
+        };
+        if control.progress {
+            eprintln!("no minimum: left along a change that begins in element {element}");
+        }
+        *search = Search {
+            departures: search.departures + 1,
+            left: Some(element),
+            ..Search::new(evaluation)
+        };
+        Ok(false)
     }
 
     /// Leaves a stationary point that is not a minimum; returns the element in which the direction of descent begins.
@@ -315,12 +363,12 @@ impl Problem<'_> {
         &self,
         iterate: &mut Iterate,
         step: &Step,
-        (now, past): (&Evaluation, &[Evaluation]),
-        weights: &[DVector<f64>],
+        search: &Search,
         (correction, shortest): (f64, f64),
     ) -> Option<(f64, Evaluation)> {
+        let (now, weights) = (&search.evaluation, &search.weights);
         let slope = step.slope - now.violation(weights);
-        let merits = past.iter().map(|past| past.merit(weights));
+        let merits = search.past.iter().map(|past| past.merit(weights));
         let reference = merits.fold(now.merit(weights), f64::max);
         let mut fraction = 1.0;
         while fraction >= shortest {
