@@ -12,6 +12,7 @@
 //! periodic Schur decomposition of the matrices of the elements ([`crate::periodic_schur`]), never from the product,
 //! so that a multiplier of 10⁻¹² keeps its digits beside one of 10¹².
 
+mod closing;
 mod error;
 #[cfg(feature = "sparse")]
 mod family;

@@ -2,6 +2,7 @@
 
 mod orbit;
 
+use super::closing::{Closing, Correction, Scales, moved, scales};
 use super::error::OrbitError;
 use super::orbit::sort;
 use super::phase::Period;
@@ -13,7 +14,7 @@ use crate::error::RunErrorKind;
 use crate::length::{FixedLength, Length};
 use crate::linearised::Linearised;
 use crate::motion::{Motion, Node, Setting};
-use crate::numbers::{larger, largest, raise};
+use crate::numbers::largest;
 use crate::periodic_schur::Multiplier;
 use crate::simulation::{Differentiable, Simulation};
 use nalgebra::{DMatrix, DVector};
@@ -179,7 +180,6 @@ where
     pub fn solve(&self) -> Result<HybridOrbit<N, L>, OrbitError> {
         /// Corrections below this that no longer decrease are rounding errors.
         const ROUNDED: f64 = 1e-9;
-        const MAX_HALVINGS: u32 = 12;
         if self.elements == 0 {
             return Err(MeshError::NoElements.into());
         }
@@ -195,59 +195,61 @@ where
         let guess = Extent::of_nodes(run.motion());
         self.check_moves(&run, &guess)?;
         let mut last = f64::INFINITY;
-        let mut iterations = 0;
-        while iterations < self.max_iterations {
-            iterations += 1;
+        let stalled = |residual, iterations| OrbitError::Stalled {
+            residual,
+            iterations,
+        };
+        for iterations in 1..=self.max_iterations {
             let (scales, residual, correction) = self.correction(&run, period)?;
-            let Correction {
-                start: change,
-                stretch,
-                gain,
-            } = correction;
-            let size = larger(largest(change.as_slice()), stretch.abs() / period);
+            let size = correction.size(period);
             let is_done = size <= self.tolerance || (size < ROUNDED && size > 0.5 * last);
             last = size;
-            let mut part = 1.0;
-            let apart = largest(residual.as_slice());
-            let mut tried = Err(OrbitError::Stalled {
-                residual: apart,
-                iterations,
-            });
-            for _ in 0..=MAX_HALVINGS {
-                let start = run.motion().states()[0].state();
-                let moved = moved::<N, L>(&start, |row| part * change[row] * scales.of(row));
-                let time = period + part * stretch;
-                if let Ok(run) = self.run(&moved, time)
-                    && (is_done || largest(self.residual(&run, &scales).as_slice()) < apart)
-                {
-                    tried = Ok((time, run));
-                    break;
-                }
-                part *= 0.5;
-            }
+            let off = largest(residual.as_slice());
+            let limit = (!is_done).then_some(off);
+            let closer = self.corrected(&run, period, (&correction, &scales), limit);
             // The correction is rounding error, so that no step can improve the residual.
-            let is_best = tried.is_err() && size < ROUNDED;
+            let is_best = closer.is_none() && size < ROUNDED;
             if !is_best {
-                (period, run) = tried?;
+                (period, run) = closer.ok_or(stalled(off, iterations))?;
                 self.check_moves(&run, &guess)?;
             }
             if is_done || is_best {
                 // A residual that no correction reduces means that the motion does not close.
                 let residual = largest(self.residual(&run, &scales).as_slice());
-                if residual <= self.tolerance.max(ROUNDED) * gain.max(1.0) {
+                if residual <= self.tolerance.max(ROUNDED) * correction.gain.max(1.0) {
                     return self.found(run, period, iterations);
                 }
-                return Err(OrbitError::Stalled {
-                    residual,
-                    iterations,
-                });
+                return Err(stalled(residual, iterations));
             }
         }
         let residual = largest(self.residual(&run, &scales(run.motion())).as_slice());
-        Err(OrbitError::Stalled {
-            residual,
-            iterations,
-        })
+        Err(stalled(residual, self.max_iterations))
+    }
+
+    /// The period and the motion after the largest part of a correction, 1, ½, ¼, …, with which the residual is below a
+    /// limit, if there is one.
+    fn corrected(
+        &self,
+        run: &Linearised<N, L>,
+        period: f64,
+        (correction, scales): (&Correction, &Scales),
+        limit: Option<f64>,
+    ) -> Option<(f64, Linearised<N, L>)> {
+        const MAX_HALVINGS: u32 = 12;
+        let start = run.motion().states()[0].state();
+        let residual = |run: &_| largest(self.residual(run, scales).as_slice());
+        let mut part = 1.0;
+        for _ in 0..=MAX_HALVINGS {
+            let change = |row: usize| part * correction.start[row] * scales.of(row);
+            let period = period + part * correction.stretch;
+            if let Ok(run) = self.run(&moved::<N, L>(&start, change), period)
+                && limit.is_none_or(|limit| residual(&run) < limit)
+            {
+                return Some((period, run));
+            }
+            part *= 0.5;
+        }
+        None
     }
 
     /// The correction of a motion over a period, with the scales and the residual from which it is computed.
@@ -427,111 +429,6 @@ where
     }
 }
 
-/// A Newton correction of an orbit.
-pub(super) struct Correction {
-    /// The change of the start, in the order (p, q), divided by the scales.
-    pub(super) start: DVector<f64>,
-    /// The change of the period.
-    pub(super) stretch: f64,
-    /// The largest singular value of the equations: the largest factor from a correction to the residual.
-    pub(super) gain: f64,
-}
-
-/// The linearised equations of periodicity.
-pub(super) struct Closing<'a> {
-    /// The derivative of the end by the start, in the order (p, q).
-    pub(super) product: DMatrix<f64>,
-    /// The derivative of the end by the period, if that is unknown.
-    pub(super) rate: Option<DVector<f64>>,
-    pub(super) scales: &'a Scales,
-    pub(super) period: f64,
-}
-
-impl Closing<'_> {
-    /// The least-norm correction.
-    pub(super) fn shortest(&self, residual: &DVector<f64>) -> Result<Correction, OrbitError> {
-        /// Singular values below this, relative to the largest, count as zero; they belong to families of orbits.
-        const ZERO: f64 = 1e-9;
-        let size = residual.len();
-        let scale = |row: usize| self.scales.of(row);
-        let columns = size + usize::from(self.rate.is_some());
-        let matrix = DMatrix::from_fn(size, columns, |row, column| match &self.rate {
-            Some(rate) if column == size => rate[row] * self.period / scale(row),
-            _ => {
-                let unit = if row == column { 1.0 } else { 0.0 };
-                self.product[(row, column)] * scale(column) / scale(row) - unit
-            }
-        });
-        let stalled = OrbitError::Stalled {
-            residual: largest(residual.as_slice()),
-            iterations: 0,
-        };
-        // The singular value decomposition would not terminate.
-        let mut entries = matrix.iter().chain(residual.iter());
-        if !entries.all(|entry| entry.is_finite()) {
-            return Err(stalled);
-        }
-        let svd = matrix.svd(true, true);
-        let gain = svd.singular_values.amax();
-        let Ok(change) = svd.solve(&-residual, ZERO * gain) else {
-            return Err(stalled);
-        };
-        let stretch = self
-            .rate
-            .as_ref()
-            .map_or(0.0, |_| change[size] * self.period);
-        Ok(Correction {
-            start: change.rows(0, size).into_owned(),
-            stretch,
-            gain,
-        })
-    }
-}
-
-/// The scales of coordinates and momenta.
-pub(super) struct Scales {
-    pub(super) q: f64,
-    pub(super) p: f64,
-    /// The scale of each component, in the order (p, q).
-    own: Vec<f64>,
-}
-
-impl Scales {
-    /// The scale of a component, in the order (p, q).
-    pub(super) fn of(&self, row: usize) -> f64 {
-        self.own[row]
-    }
-}
-
-/// The scale of all components of a kind is the largest of them. Much smaller components, such as an angle beside a
-/// distance, have scales of their own, unless they are small enough to be rounding errors of the largest, as components
-/// that vanish by symmetry.
-pub(super) fn scales<const N: usize, L: Length<N>>(motion: &Motion<N, L>) -> Scales {
-    const SMALL: f64 = 1e-3;
-    const ROUNDINGS: f64 = 1e-12;
-
-    let n = motion.last().q.as_ref().len();
-    let mut own = Vec::with_capacity(2 * n);
-    let mut of_kind = |of: fn(&Node<N, L>) -> &L::Vector| {
-        let mut sizes = vec![0.0_f64; n];
-        for node in motion.states() {
-            for (size, value) in sizes.iter_mut().zip(of(node).as_ref()) {
-                raise(size, value.abs());
-            }
-        }
-        let largest = largest(&sizes);
-        let largest = if largest > 0.0 { largest } else { 1.0 };
-        own.extend(sizes.iter().map(|size| {
-            let is_small = *size < SMALL * largest && *size > ROUNDINGS * largest;
-            if is_small { *size } else { largest }
-        }));
-        largest
-    };
-    let p = of_kind(|node| &node.p);
-    let q = of_kind(|node| &node.q);
-    Scales { q, p, own }
-}
-
 /// The first parameter that events have left at another value than at the start: the motion of the next period would
 /// differ.
 fn left_over<'s, M, L, const N: usize>(model: &M, settings: &'s [Setting]) -> Option<&'s Setting>
@@ -549,18 +446,4 @@ where
         own.map(|index| model.parameter_value(index)) != Some(one.value)
     });
     left.map(|(_, one)| one)
-}
-
-/// A state plus a change of its components, which are counted in the order (p, q).
-pub(super) fn moved<const N: usize, L: Length<N>>(
-    state: &L::State,
-    change: impl Fn(usize) -> f64,
-) -> L::State {
-    let (q, p) = L::parts(state);
-    let (old_q, old_p) = (q.as_ref(), p.as_ref());
-    let n = old_q.len();
-    L::state(
-        L::from_fn(q, |a| old_q[a] + change(n + a)),
-        L::from_fn(p, |a| old_p[a] + change(a)),
-    )
 }

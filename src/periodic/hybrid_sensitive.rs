@@ -1,7 +1,8 @@
 //! Periodic orbits with events, with their derivatives by parameters.
 
+use super::closing::{Closing, Correction, moved, scales};
 use super::error::OrbitError;
-use super::hybrid::{Closing, Correction, HybridOrbit, HybridOrbits, moved, scales};
+use super::hybrid::{HybridOrbit, HybridOrbits};
 use super::moving;
 use super::orbit::sort;
 use super::phase::Period;
