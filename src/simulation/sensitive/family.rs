@@ -160,25 +160,9 @@ impl Carrying {
         element: &Element,
         transition: &TransitionOperator,
     ) -> Result<(), OperatorError> {
-        let count = self.carried.indices().len();
-        let keeps = self.carried.keeps_inside();
-        let Before { state, start } = &self.carried.before;
+        let Before { state, .. } = &self.carried.before;
         let (size, columns) = state.shape();
-        let ends = element.moves.1;
-        let start = start.as_ref().filter(|_| element.moves.0);
-        // Adds the derivatives by parameters, and those by the start time of the element if an event moves it.
-        let add = |by: &[Vec<f64>], to: &mut DMatrix<f64>| {
-            for (by, mut to) in by.iter().take(count).zip(to.column_iter_mut().skip(size)) {
-                to += DVector::from_column_slice(by);
-            }
-            let Some((by, times)) = by.get(count).zip(start) else {
-                return;
-            };
-            let by = DVector::from_column_slice(by);
-            for (dt, mut to) in times.iter().zip(to.column_iter_mut()) {
-                to.axpy(*dt, &by, 1.0);
-            }
-        };
+        let keeps = self.carried.keeps_inside();
         let mut next = DMatrix::zeros(size, columns);
         let mut along = Vec::new();
         for (from, mut to) in state.column_iter().zip(next.column_iter_mut()) {
@@ -188,42 +172,17 @@ impl Carrying {
             to.copy_from_slice(&end);
             along.extend(own);
         }
-        add(transition.by_parameters(), &mut next);
+        self.add_direct(element, transition.by_parameters(), &mut next);
         // A product over many elements can overflow although each factor is finite.
         if !next.iter().all(|one| one.is_finite()) {
             return Err(StepError::NonFinite.into());
         }
         let along = keeps.then(|| {
-            let rows = along.len() / columns;
-            let mut slopes = DMatrix::from_vec(rows, columns, along);
-            let by = transition.inside_by_parameters();
-            add(by, &mut slopes);
-            let mut start = state.clone();
-            if let Some(by_end) = by.last().filter(|_| ends) {
-                slopes = slopes.insert_column(columns, 0.0);
-                slopes.column_mut(columns).copy_from_slice(by_end);
-                start = start.insert_column(columns, 0.0);
-            }
-            let rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
-            let piece = AlongPiece {
-                times: element.nodes,
-                length: element.h,
-                slopes: InsideSlopes {
-                    ends: <[Vec<f64>; 2]>::default(),
-                    start: rows(&start),
-                    coefficients: rows(&slopes),
-                },
-                values: transition.dense().coefficients(),
-            };
-            Along {
-                times: element.nodes,
-                pieces: vec![piece],
-                before: Before {
-                    state: DMatrix::identity(size, columns),
-                    start: None,
-                },
-            }
+            let mut slopes = DMatrix::from_vec(along.len() / columns, columns, along);
+            self.add_direct(element, transition.inside_by_parameters(), &mut slopes);
+            self.along(element, transition, slopes)
         });
+        let (_, ends) = element.moves;
         let rate = transition.by_parameters().last().filter(|_| ends);
         if let Some(rate) = rate {
             let rate = DMatrix::from_column_slice(size, 1, rate);
@@ -235,6 +194,61 @@ impl Carrying {
         }
         self.carried.passed(next);
         Ok(())
+    }
+
+    /// Adds the derivatives by parameters, and those by the start time of the element if an event moves it.
+    fn add_direct(&self, element: &Element, by: &[Vec<f64>], to: &mut DMatrix<f64>) {
+        let Before { state, start } = &self.carried.before;
+        let count = self.carried.indices().len();
+        let parameters = to.column_iter_mut().skip(state.nrows());
+        for (by, mut to) in by.iter().take(count).zip(parameters) {
+            to += DVector::from_column_slice(by);
+        }
+        let start = start.as_ref().filter(|_| element.moves.0);
+        let Some((by, times)) = by.get(count).zip(start) else {
+            return;
+        };
+        let by = DVector::from_column_slice(by);
+        for (dt, mut to) in times.iter().zip(to.column_iter_mut()) {
+            to.axpy(*dt, &by, 1.0);
+        }
+    }
+
+    /// The derivatives along an element, from those of the coefficients of its polynomials; with a column for the time of
+    /// its end if an event moves it.
+    fn along(
+        &self,
+        element: &Element,
+        transition: &TransitionOperator,
+        mut slopes: DMatrix<f64>,
+    ) -> Along {
+        let mut start = self.carried.before.state.clone();
+        let (size, columns) = start.shape();
+        let (_, ends) = element.moves;
+        if let Some(by_end) = transition.inside_by_parameters().last().filter(|_| ends) {
+            slopes = slopes.insert_column(columns, 0.0);
+            slopes.column_mut(columns).copy_from_slice(by_end);
+            start = start.insert_column(columns, 0.0);
+        }
+        let rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
+        let piece = AlongPiece {
+            times: element.nodes,
+            length: element.h,
+            slopes: InsideSlopes {
+                ends: <[Vec<f64>; 2]>::default(),
+                start: rows(&start),
+                coefficients: rows(&slopes),
+            },
+            values: transition.dense().coefficients(),
+        };
+        Along {
+            times: element.nodes,
+            pieces: vec![piece],
+            before: Before {
+                state: DMatrix::identity(size, columns),
+                start: None,
+            },
+        }
     }
 
     /// Processes a record between elements.
