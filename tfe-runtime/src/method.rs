@@ -134,6 +134,7 @@ impl<const N: usize> State<N> {
     }
 
     /// Whether all numbers are finite.
+    #[inline(always)]
     pub(crate) fn is_finite(&self) -> bool {
         largest(&self.q).is_finite() && largest(&self.p).is_finite()
     }

@@ -147,6 +147,7 @@ where
     }
 
     /// Refuses an end that is not finite, and one that Newton's method does not show to continue the motion.
+    #[inline(always)]
     fn check_end<const N: usize>(
         &self,
         evidence: Option<&Evidence>,
