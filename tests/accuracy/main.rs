@@ -304,6 +304,35 @@ fn linear_models_too() {
     assert!((motion.last().q[0] - 100.0_f64.cos()).abs() <= 1e-9);
 }
 
+#[dynamics(coordinates(x), lagrangian = dot(x)^2/2 - k/2*x^2)]
+struct Spring {
+    k: f64,
+}
+
+/// Runs that agree to the last bit although no iteration tells their order, as those of linear models do over short
+/// spans, at rest, and with coordinates of any size.
+#[test]
+fn runs_without_a_difference_meet_an_accuracy() {
+    let half = 0.5_f64;
+    let cases = [
+        (0.0, 1.0, 1.0),
+        (-1.0, 1.0, half.cosh()),
+        (1.0, 1e150, half.cos()),
+        (1.0, 1e-300, half.cos()),
+        (1.0, 0.0, 0.0),
+    ];
+    for (k, x, factor) in cases {
+        for accuracy in [1e-3, 1e-6, 1e-8, 1e-10, 1e-12] {
+            let spring = Spring { k };
+            let simulation = Simulation::new(&spring).accuracy(accuracy);
+            let motion = simulation.run(spring.state([x], [0.0]), 0.0..half);
+            let motion = motion.unwrap_or_else(|error| panic!("{k} {x:e} {accuracy}: {error}"));
+            let off = (motion.last().q[0] - factor * x).abs();
+            assert!(off <= accuracy * x, "{k} {x:e} {accuracy}: {off}");
+        }
+    }
+}
+
 #[dynamics(
     coordinates(x),
     lagrangian = dot(x)^2/2 - x^2/2 - x^4/4,

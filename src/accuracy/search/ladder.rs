@@ -85,7 +85,9 @@ impl Ladder {
         let ratio = longer / step;
         let power = match (self.differences, self.attempts.iter().rev().nth(1)) {
             (Some(earlier), Some(first)) if earlier <= RESOLVED => {
-                power_of(earlier / differences, [first.step / longer, ratio])
+                // Two runs that agree to the last bit have no order either; they agree to rounding.
+                let [earlier, now] = [earlier, differences].map(|found| found.max(f64::EPSILON));
+                power_of(earlier / now, [first.step / longer, ratio])
             }
             _ => None,
         };
