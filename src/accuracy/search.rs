@@ -282,7 +282,8 @@ fn climb(
         }
     }
     let Some((errors, is_met)) = ladder.errors else {
-        return Err(failure.unwrap_or(RunErrorKind::Step { step }));
+        let span = asked.span.end - asked.span.start;
+        return Err(failure.unwrap_or(RunErrorKind::TooManySteps { span, step }));
     };
     let mut attempts = ladder.attempts;
     let extremes = settings.measure(&mut attempts);

@@ -266,3 +266,21 @@ fn outputs_without_a_value_are_told() {
         "{error}"
     );
 }
+
+/// Where steps of any length differ, as those of a body without a mass, the message is not about a step that nobody gave.
+#[test]
+fn steps_that_all_differ_are_too_many() {
+    let body = Body { m: 0.0 };
+    let run = Simulation::new(&body).accuracy(1e-6);
+    let error = run.run(body.state([1.0], [0.0]), 0.0..1.0);
+    let error = error.expect_err("there is no motion");
+    assert!(
+        matches!(error.kind(), RunErrorKind::TooManySteps { .. }),
+        "{error}"
+    );
+}
+
+#[dynamics(coordinates(x), lagrangian = m/2*dot(x)^2 - x^2/2)]
+struct Body {
+    m: f64,
+}

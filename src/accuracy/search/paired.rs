@@ -382,7 +382,8 @@ impl<'a> PairSearch<'a> {
         } = self;
         let Some((times, errors, is_met)) = completed else {
             let step = settings.step;
-            return Err(failure.unwrap_or(RunErrorKind::Step { step }));
+            let span = asked.span.end - asked.span.start;
+            return Err(failure.unwrap_or(RunErrorKind::TooManySteps { span, step }));
         };
         let extremes = settings.measure(&mut attempts);
         Ok(Climbed::Found(Box::new(Found {

@@ -83,7 +83,9 @@ pub(super) fn probe(
         settings.step = h;
         return Ok((h * wanted.clamp(1e-3, 2.0), wanted));
     }
-    Err(failure.unwrap_or(RunErrorKind::Step {
+    // Without a failure all steps differ, down to those that no time resolves.
+    Err(failure.unwrap_or(RunErrorKind::TooManySteps {
+        span: span.end - span.start,
         step: settings.step,
     }))
 }

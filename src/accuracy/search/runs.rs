@@ -271,7 +271,7 @@ impl<'r> Noting<'r> {
     ) -> Result<Found, RunErrorKind> {
         let is_short_enough = match &found {
             Ok(found) => found.is_met || found.picked.error_estimate.is_finite(),
-            Err(RunErrorKind::Step { .. } | RunErrorKind::TooManySteps { .. }) => false,
+            Err(RunErrorKind::TooManySteps { .. }) => false,
             Err(_) => true,
         };
         match self.lost {
