@@ -54,7 +54,9 @@ pub enum Warning {
         time: f64,
     },
     /// The model conserves the energy, but between two nodes it changes by more than a tenth of the largest kinetic
-    /// energy so far: the step is too long for the motion, or the motion has passed a singular point.
+    /// energy so far, or, over a time in which the kinetic energy was above its mean so far, by more than a tenth of
+    /// this mean, or of the kinetic energy after that time: the step is too long for the motion, as in a close encounter,
+    /// or the motion has passed a singular point.
     ///
     /// Checked at every recorded node, except across impulses, and unless the model is linear, forced, damped, depends
     /// on time or has constraints.

@@ -6,6 +6,7 @@ use crate::length::Length;
 use crate::motion::{Motion, Node, Warning};
 use crate::stability::growth::Growth;
 use crate::stability::linear_model::LinearModel;
+use std::mem;
 use tfe_runtime::{Element, Model, State};
 
 /// Collects the warnings of a run: examines some of its elements, and the energy of its recorded nodes.
@@ -134,14 +135,20 @@ impl Watch {
             return;
         }
         // p·v is twice the kinetic energy of a Lagrangian. For other Hamiltonians half of it still serves as a scale.
-        self.energy.scale = self.energy.scale.max(0.5 * action.abs());
-        let last = self.energy.last.replace(energy);
-        let (Some(before), true) = (last, is_conserved) else {
-            return;
-        };
-        if !is_jump([before, energy], self.energy.scale, rounding) {
-            return;
+        let kinetic = 0.5 * action.abs();
+        self.energy.scale = self.energy.scale.max(kinetic);
+        let last = self.energy.last.replace(energy).filter(|_| is_conserved);
+        let behind = (self.energy.bursts).pass((time, energy), kinetic, is_conserved);
+        let kinds = [last.map(|before| (before, self.energy.scale)), behind];
+        let is_one = |(before, scale): &(f64, f64)| is_jump([*before, energy], *scale, rounding);
+        if let Some((before, _)) = kinds.into_iter().flatten().find(is_one) {
+            self.jumps(time, before, energy);
+            self.energy.bursts.before = None; // Each jump counts once.
         }
+    }
+
+    /// Counts a jump of the energy; the warning tells the largest one.
+    fn jumps(&mut self, time: f64, before: f64, energy: f64) {
         let jump = (energy - before).abs();
         let place = self.energy.jump.get_or_insert_with(|| {
             self.warnings.push(Warning::EnergyJump {
@@ -194,9 +201,56 @@ struct Energy {
     last: Option<f64>,
     /// The largest kinetic energy so far.
     scale: f64,
+    bursts: Bursts,
     is_lost: bool,
     /// The index of the warning about jumps.
     jump: Option<usize>,
+}
+
+/// Bursts of the kinetic energy above its mean so far. After one, as a close encounter, an error of the energy that is
+/// small beside the kinetic energy in it is large beside that of the motion that follows.
+#[derive(Clone, Debug, Default)]
+struct Bursts {
+    /// The time and the kinetic energy of the last node.
+    last: Option<(f64, f64)>,
+    /// The time since the start, and the integral of the kinetic energy over it.
+    sums: (f64, f64),
+    /// The energy at the last node outside of bursts.
+    before: Option<f64>,
+    /// The largest kinetic energy of the burst.
+    peak: f64,
+}
+
+impl Bursts {
+    /// A burst is over where the kinetic energy is below this part of its largest value.
+    const OVER: f64 = 0.25;
+
+    /// Takes a node. Behind a burst, returns the energy before it, and the kinetic energy that is the scale of an error.
+    fn pass(
+        &mut self,
+        (time, energy): (f64, f64),
+        kinetic: f64,
+        is_conserved: bool,
+    ) -> Option<(f64, f64)> {
+        if let Some((before, first)) = self.last.replace((time, kinetic)) {
+            let step = (time - before).abs();
+            self.sums.0 += step;
+            self.sums.1 += 0.5 * step * (first + kinetic);
+        }
+        if !is_conserved {
+            self.before = None;
+        }
+        let mean = self.sums.1 / self.sums.0;
+        // The first node has no mean.
+        if kinetic > mean {
+            self.peak = self.peak.max(kinetic);
+            let before = self.before.filter(|_| kinetic < Self::OVER * self.peak)?;
+            return Some((before, kinetic));
+        }
+        let is_behind = mem::take(&mut self.peak) > 0.0;
+        let before = self.before.replace(energy)?;
+        is_behind.then_some((before, mean))
+    }
 }
 
 /// The data of a recorded node that are checked.

@@ -1,6 +1,7 @@
 //! Difficult runs: what ends with `Ok` is right, or has a warning.
 
 mod checkpoints;
+mod encounters;
 mod indices;
 #[path = "../common/largest.rs"]
 mod largest;
