@@ -38,7 +38,8 @@ impl<M: family::Model> Simulation<'_, M, 0, RunTimeLength> {
     /// ```
     #[must_use]
     pub fn impulse(mut self, time: f64, impulse: impl Into<Vec<f64>>) -> Self {
-        self.breaks.push(time);
+        // No element ends at a time that is no number; the impulse is refused when the run begins.
+        self.breaks.extend(Some(time).filter(|time| !time.is_nan()));
         self.impulses.push((time, impulse.into()));
         self
     }

@@ -375,10 +375,10 @@ impl<'m, M: Model<N>, const N: usize> Simulation<'m, M, N> {
     /// number for each coordinate, in units of that coordinate's momentum.
     ///
     /// Inside an element the impulse is weighted by the test functions (T-49); at a node it changes the momentum there,
-    /// and the recorded node at that instant shows the momentum before the impulse. In a run backwards in time the
-    /// impulse is subtracted, as the effect of any force is. An impulse outside the span of a run is an error,
-    /// [`RunErrorKind::Impulse`](crate::RunErrorKind::Impulse), and not left out as a [break](Self::break_at) is; those
-    /// before the checkpoint of a run that is [resumed](Self::resume) have acted.
+    /// and the recorded node at that instant shows the momentum before the impulse, except at the end of the span: the
+    /// last node has it. In a run backwards in time the impulse is subtracted, as the effect of any force is. An impulse
+    /// outside the span of a run is an error, [`RunErrorKind::Impulse`](crate::RunErrorKind::Impulse), and not left out
+    /// as a [break](Self::break_at) is; those before the checkpoint of a run that is [resumed](Self::resume) have acted.
     ///
     /// ```
     /// use tfe::prelude::*;

@@ -126,6 +126,12 @@ fn what_cannot_act_is_refused() {
             RunErrorKind::Impulse { time }
         );
     }
+    // Also where it would be a break.
+    let found = kind(run.impulse(f64::NAN, [1.0; 5]));
+    assert!(
+        matches!(found, RunErrorKind::Impulse { time } if time.is_nan()),
+        "{found}"
+    );
 }
 
 #[test]
