@@ -393,3 +393,42 @@ fn a_table_of_a_branch_has_a_column_for_each_multiplier() {
         assert_eq!(line.split(',').count(), 9, "{line}");
     }
 }
+
+/// A pendulum with two constraints, of which the elements take either: which one, rounding errors decide.
+#[test]
+fn derivatives_of_orbits_do_not_depend_on_which_constraints_are_redundant() {
+    #[dynamics(
+        coordinates(x, y),
+        lagrangian = m*(dot(x)^2 + dot(y)^2)/2 - m*g*y,
+        constraint(rod) = k*(x^2 + y^2 - l^2),
+        constraint(length) = sqrt(x^2 + y^2) - l,
+    )]
+    struct Twofold {
+        m: f64,
+        g: f64,
+        l: f64,
+        k: f64,
+    }
+    let minimal = Pendulum { m: 1.0, k: 9.81 };
+    let angle = PeriodicOrbit::of(&minimal).element(Mixed::<8>);
+    let angle = angle.elements(60).unknown_period(2.15);
+    let angle = angle
+        .guess_from(minimal.state([1.0], [0.0]))
+        .solve_sensitive();
+    // With m = l = 1 the energy is m l² φ̇²/2 − m g l cos φ, and k of the other model is m g l.
+    let expected = angle.expect("an orbit").by("k").period();
+    for k in [0.3, 0.49, 0.499, 0.6, 2.0] {
+        let (m, g, l) = (1.0, 9.81, 1.0);
+        let twofold = Twofold { m, g, l, k };
+        let (sin, cos) = 1.0_f64.sin_cos();
+        for elements in [40, 41, 80] {
+            let orbit = PeriodicOrbit::of(&twofold).element(Mixed::<6>);
+            let orbit = orbit.elements(elements).unknown_period(2.15);
+            let orbit = orbit.guess_from(twofold.state([sin, -cos], [0.0; 2]));
+            let found = orbit.solve_sensitive().expect("an orbit").by("g").period();
+            // The elements differ, since the coordinates do: errors of tenth order.
+            let off = (found - expected).abs();
+            assert!(off <= 1e-8, "{k} {elements}: {found} {expected}");
+        }
+    }
+}

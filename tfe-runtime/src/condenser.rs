@@ -257,6 +257,8 @@ impl<const N: usize> Condenser<N> {
             check_element(M::CONSTRAINTS, element)?;
             parts.kept.momenta.fill(start.p);
             let mut rows = Rows::at_start(parts.rows, model, time, &start.q);
+            let layout = Layout::new(&element, N, M::CONSTRAINTS.len());
+            layout.mark_used(interior, parts.active);
             choose(&mut rows, model, (time, &start.q), parts.active);
             let mut form = ConstrainedForm::new(
                 VelocityForm::new(
@@ -265,7 +267,7 @@ impl<const N: usize> Condenser<N> {
                     parts.kept,
                     (&mut self.memory.mass, &mut self.memory.statistics),
                 ),
-                Layout::new(&element, N, M::CONSTRAINTS.len()),
+                layout,
                 rows,
                 parts.active,
                 [0.0; N],

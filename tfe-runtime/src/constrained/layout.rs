@@ -79,6 +79,20 @@ impl Layout {
         (starts.chain([self.node(0)])).map(move |start| start..start + constraints)
     }
 
+    /// Marks the constraints that have multipliers in these unknowns, if there are such: of dependent ones those have to
+    /// be chosen again.
+    pub(crate) fn mark_used(&self, unknowns: &[f64], marks: &mut [usize]) {
+        let is_used = |c: usize| {
+            self.multipliers()
+                .any(|range| unknowns[range.start + c] != 0.0)
+        };
+        if (0..marks.len()).any(is_used) {
+            for (c, mark) in marks.iter_mut().enumerate() {
+                *mark = usize::from(is_used(c));
+            }
+        }
+    }
+
     /// Sets the multipliers to those of constant reactions λ, μ = −λ t; zero where the reactions are unknown.
     #[cfg(feature = "alloc")]
     pub(crate) fn guess(
