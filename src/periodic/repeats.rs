@@ -22,6 +22,10 @@ const MAX: f64 = 1e-4;
 /// The same as part of the rates themselves, which are rounded.
 const ROUNDINGS: f64 = 1e-9;
 
+/// The rounding errors of the largest reaction that the rate of a momentum may have: that of a coordinate without
+/// inertia, of which forces and reactions cancel, is nothing else.
+const OF_REACTIONS: f64 = 16.0;
+
 /// The rates (dp/dt, dq/dt) at a node.
 pub(super) fn rate<M, L, const N: usize>(model: &M, node: &Node<N, L>) -> DVector<f64>
 where
@@ -54,16 +58,23 @@ where
     if M::GIVEN_INPUTS || !(M::DEPENDS_ON_TIME || grows) {
         return Ok(());
     }
-    let rates = |t: f64, state: &L::State| {
+    let at = |t: f64, state: &L::State| {
         let still = L::zero(L::parts(state).0);
-        rate(model, &Node::new(model, t, state, &still))
+        Node::new(model, t, state, &still)
     };
+    let rates = |t: f64, state: &L::State| rate(model, &at(t, state));
+    let mut balance = 0.0;
     let mut seen = Vec::new();
     for pair in nodes.windows(2).step_by(nodes.len().div_ceil(PLACES)) {
         let (t, state) = (pair[0].0 + GOLDEN * (pair[1].0 - pair[0].0), &pair[0].1);
         let (q, p) = L::parts(state);
         let later = L::state(L::from_fn(q, |a| q.as_ref()[a] + grown(a)), p.clone());
-        let now = rates(t, state);
+        let node = at(t, state);
+        if const { M::IS_CONSTRAINED } {
+            let rounding = model.force_rounding(t, (&node.q, &node.p), &node.v);
+            raise(&mut balance, OF_REACTIONS * rounding);
+        }
+        let now = rate(model, &node);
         let off = rates(t + period, &later) - &now;
         let varies = rates(t + GOLDEN * period, state) - &now;
         // Where there are no rates, nothing is compared.
@@ -82,7 +93,8 @@ where
         }
         // Sums of coordinates that have grown are rounded otherwise.
         let rounded = if grows { MAX } else { ROUNDINGS };
-        if worst.1 > MAX * variation + rounded * size {
+        let of_reactions = if row < n { balance } else { 0.0 };
+        if worst.1 > MAX * variation + rounded * size + of_reactions {
             return Err(OrbitError::NotRepeated {
                 period,
                 time: worst.0,

@@ -432,3 +432,60 @@ fn derivatives_of_orbits_do_not_depend_on_which_constraints_are_redundant() {
         }
     }
 }
+
+/// The mass on a rod beside its angle, which has no inertia and on which the torque acts: the force on it and the
+/// reactions cancel.
+#[test]
+fn coordinates_without_inertia_repeat() {
+    #[dynamics(
+        coordinates(x, y, phi),
+        lagrangian = (dot(x)^2 + dot(y)^2)/2 - g*y,
+        constraint(across) = x - sin(phi),
+        constraint(along) = y + cos(phi),
+        force(phi) = f*cos(omega*t) - c*dot(phi),
+    )]
+    struct Both {
+        g: f64,
+        omega: f64,
+        f: f64,
+        c: f64,
+    }
+    let (f, c) = (0.8, 0.05);
+    let angle = twins(0.0, f, c).0;
+    let both = Both {
+        g: 1.0,
+        omega: OMEGA,
+        f,
+        c,
+    };
+    let amplitude = f / (1.0 - OMEGA * OMEGA);
+    let curve = |t: f64| {
+        let (sin, cos) = (OMEGA * t).sin_cos();
+        (amplitude * cos, -amplitude * OMEGA * sin)
+    };
+    for elements in [30, 40, 60] {
+        let minimal = PeriodicOrbit::of(&angle).element(Mixed::<6>);
+        let minimal = minimal.elements(elements).period(TAU / OMEGA);
+        let minimal = minimal.guess(|t| {
+            let (phi, rate) = curve(t);
+            ([phi], [rate])
+        });
+        let minimal = minimal.solve().expect("an orbit");
+        let orbit = PeriodicOrbit::of(&both).element(Mixed::<6>);
+        let orbit = orbit.elements(elements).period(TAU / OMEGA);
+        let orbit = orbit.guess(|t| {
+            let (phi, rate) = curve(t);
+            let ([x, y], [vx, vy]) = mass(&angle, t, phi, rate);
+            ([x, y, phi], [vx, vy, rate])
+        });
+        let orbit = orbit
+            .solve()
+            .unwrap_or_else(|error| panic!("{elements}: {error}"));
+        let (found, expected) = (orbit.multipliers(), minimal.multipliers());
+        assert_eq!(found.len(), 2);
+        for (found, expected) in found.iter().zip(expected) {
+            // As those of the twins above.
+            assert!((found - expected).norm() <= 1e-9, "{found} {expected}");
+        }
+    }
+}
