@@ -70,7 +70,7 @@ pub enum Warning {
         /// The number of such jumps.
         count: usize,
     },
-    /// Forces of the model have kinks or jumps, and steps do not [end](crate::Simulation::at_kinks) there. Elements
+    /// Forces or constraints of the model have kinks or jumps, and steps do not [end](crate::Simulation::at_kinks) there. Elements
     /// that cross one lose their order of accuracy, and so do both runs that an error estimate compares. Derivatives across
     /// a jump are wrong: the change of the time at which the motion crosses it is missing.
     ///
@@ -160,7 +160,7 @@ impl fmt::Display for Warning {
                 f.write_str(": take a shorter step, or look for a singular point of the model")
             }
             Self::KinksCrossed => f.write_str(
-                "forces of the model have kinks or jumps inside steps: elements lose their order of accuracy there, and errors fall more slowly with the step size than for smooth forces; derivatives across a jump are wrong; `at_kinks(true)` ends steps there",
+                "forces or constraints of the model have kinks or jumps inside steps: elements lose their order of accuracy there, and errors fall more slowly with the step size than for smooth forces; derivatives across a jump are wrong; `at_kinks(true)` ends steps there",
             ),
             Self::Unresolved {
                 time,

@@ -229,7 +229,7 @@ pub enum StepError {
     /// After crossing a jump of a force, or of the gradient of a constraint, the motion returns to it at once: it would
     /// slide along the jump (Filippov), which the equations as declared do not describe.
     Slides,
-    /// The step crosses more kinks or jumps of forces than it can be cut at.
+    /// The step crosses more kinks or jumps of forces and constraints than it can be cut at.
     TooManyKinks,
     /// The Legendre transform failed at a point of the element.
     Legendre(LegendreError),
@@ -337,7 +337,7 @@ impl fmt::Display for StepError {
                  replace the jump by a continuous law, such as tanh(v/w) for sign(v)",
             ),
             Self::TooManyKinks => f.write_str(
-                "the step crosses kinks or jumps of forces more often than it can be cut: take a shorter step",
+                "the step crosses kinks or jumps of forces and constraints more often than it can be cut: take a shorter step",
             ),
             Self::Legendre(source) => source.fmt(f),
             Self::Constraint(source) => source.fmt(f),

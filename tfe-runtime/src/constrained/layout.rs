@@ -81,6 +81,7 @@ impl Layout {
 
     /// Marks the constraints that have multipliers in these unknowns, if there are such: of dependent ones those have to
     /// be chosen again.
+    #[cfg(feature = "alloc")]
     pub(crate) fn mark_used(&self, unknowns: &[f64], marks: &mut [usize]) {
         let is_used = |c: usize| {
             self.multipliers()
