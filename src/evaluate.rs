@@ -31,8 +31,14 @@ pub trait Evaluate<const N: usize, L: Length<N>>: Sized {
     /// The energy H = p·v − L, from coordinates, momenta and velocities.
     fn energy(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
 
-    /// The rounding error of the energy, if it is a difference of nearly equal numbers; zero if unknown.
-    fn energy_rounding(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
+    /// The rounding error of the energy, if it is a difference of nearly equal numbers, and what rounding errors of
+    /// positions change of it at rest in a time; zero if unknown.
+    fn energy_rounding(
+        &self,
+        times: (f64, f64),
+        at: (&L::Vector, &L::Vector),
+        velocity: &L::Vector,
+    ) -> f64;
 
     /// The rounding error of forces, if they are differences of nearly equal numbers; zero if unknown.
     fn force_rounding(&self, t: f64, at: (&L::Vector, &L::Vector), velocity: &L::Vector) -> f64;
@@ -113,12 +119,19 @@ impl<M: Model<N>, const N: usize> Evaluate<N, FixedLength> for M {
         legendre::energy_at(self, t, q, p, velocity)
     }
 
-    fn energy_rounding(&self, t: f64, (q, p): (&[f64; N], &[f64; N]), velocity: &[f64; N]) -> f64 {
+    fn energy_rounding(
+        &self,
+        (t, time): (f64, f64),
+        (q, p): (&[f64; N], &[f64; N]),
+        velocity: &[f64; N],
+    ) -> f64 {
         legendre::energy_rounding(self, t, q, p, velocity)
+            + constrained::work_of_roundings(self, (t, time), q, velocity)
     }
 
     fn force_rounding(&self, t: f64, (q, p): (&[f64; N], &[f64; N]), velocity: &[f64; N]) -> f64 {
         legendre::force_rounding(self, t, q, p, velocity)
+            + constrained::reaction_rounding(self, t, q, velocity)
     }
 
     fn outputs(
@@ -181,12 +194,19 @@ impl<M: family::Model> Evaluate<0, RunTimeLength> for M {
         family::energy_at(self, t, (q, p), velocity)
     }
 
-    fn energy_rounding(&self, t: f64, (q, p): (&Vec<f64>, &Vec<f64>), velocity: &Vec<f64>) -> f64 {
+    fn energy_rounding(
+        &self,
+        (t, time): (f64, f64),
+        (q, p): (&Vec<f64>, &Vec<f64>),
+        velocity: &Vec<f64>,
+    ) -> f64 {
         family::energy_rounding(self, t, (q, p), velocity)
+            + family::work_of_roundings(self, (t, time), q, velocity)
     }
 
     fn force_rounding(&self, t: f64, (q, p): (&Vec<f64>, &Vec<f64>), velocity: &Vec<f64>) -> f64 {
         family::force_rounding(self, t, (q, p), velocity)
+            + family::reaction_rounding(self, t, q, velocity)
     }
 
     fn outputs(

@@ -22,6 +22,7 @@ mod recorder;
 mod resolution;
 #[cfg(feature = "sparse")]
 mod retrace;
+mod rounding;
 mod run;
 mod section;
 mod sensitive;

@@ -276,7 +276,7 @@ where
                     let (results, energies) = &mut *results;
                     let mut warnings = WarningCounts::default();
                     if let (Some(before), Some(after)) = (energies.get_mut(index), after) {
-                        let rounding = || node.map_or(0.0, |node| model.rounding_at(node));
+                        let rounding = || node.map_or(0.0, |node| model.rounding_at(node, length));
                         let conserves = ensemble.conserves();
                         warnings = WarningCounts::of(conserves, *before, after, &rounding);
                         *before = after;

@@ -132,7 +132,7 @@ where
             |node| {
                 let before = Energy::of(model, from, start);
                 let after = Energy::at(model, node);
-                let rounding = || model.rounding_at(node);
+                let rounding = || model.rounding_at(node, node.t - from);
                 WarningCounts::of(self.conserves(), before, after, &rounding)
             },
         )

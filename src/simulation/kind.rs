@@ -192,10 +192,10 @@ pub trait Simulated<const N: usize, L: Length<N>>: Evaluate<N, L> {
         at: (f64, &L::State),
     );
 
-    /// The rounding error of the energy of a node; zero for models that do not conserve energy.
-    fn rounding_at(&self, node: &Node<N, L>) -> f64 {
+    /// The rounding error of the energy of a node, at rest that of a time; zero for models that do not conserve energy.
+    fn rounding_at(&self, node: &Node<N, L>, time: f64) -> f64 {
         match const { Self::CONSERVES } {
-            true => self.energy_rounding(node.t, (&node.q, &node.p), &node.v),
+            true => self.energy_rounding((node.t, time), (&node.q, &node.p), &node.v),
             false => 0.0,
         }
     }

@@ -78,7 +78,7 @@ where
             self.record(stepper, model, (t, state));
             self.tell();
         }
-        self.record.check_energy(&|node| model.rounding_at(node));
+        (self.record).check_energy(&|node, time| model.rounding_at(node, time));
     }
 
     /// Called after an element that failed.
@@ -154,11 +154,12 @@ impl<const N: usize, L: Length<N>> Record<N, L> {
         }
     }
 
-    /// Compares the energy of the last node with that of the one before; `rounding` returns its rounding error.
-    fn check_energy(&mut self, rounding: &dyn Fn(&Node<N, L>) -> f64) {
+    /// Compares the energy of the last node with that of the one before; `rounding` returns its rounding error for the
+    /// time between them.
+    fn check_energy(&mut self, rounding: &dyn Fn(&Node<N, L>, f64) -> f64) {
         let node = self.motion.last();
         let recorded = Recorded::last_of(&self.motion, self.is_conserved);
-        self.watch.pass(recorded, &|| rounding(node));
+        self.watch.pass(recorded, &|time| rounding(node, time));
         self.is_conserved = self.conserves;
     }
 

@@ -3,8 +3,10 @@
 
 use super::follow::Passed;
 use super::kind::{Chosen, Simulated};
+use super::rounding::roundings;
 use crate::length::Length;
 use crate::motion::Warning;
+use crate::numbers::largest;
 use std::fmt;
 use tfe_runtime::{Element, Share, Solve, Statistics};
 
@@ -162,7 +164,14 @@ where
         let mut advance = |element: (f64, f64), state: &mut L::State| {
             Self::advance(again, stepper, element, state)
         };
+        let before = self.comparisons.found.compared.len();
         self.comparisons.compare(asked, passed, &mut advance);
+        if const { M::IS_CONSTRAINED } {
+            let at = (passed.t, passed.h);
+            let roundings = || roundings::<M, N, L>(&again.model, at, passed.before);
+            let found = &mut self.comparisons.found;
+            found.forgive(before, halves::<N, L>(passed.after), &roundings);
+        }
     }
 
     /// Advances a state over an element with the stepper of comparisons. One that has failed is not used again.
@@ -343,6 +352,27 @@ impl Found {
         match &mut self.bounds {
             Some(bounds) => bounds.include(state),
             None => self.bounds = Some(Bounds::of(state)),
+        }
+    }
+
+    /// Ignores, from the comparison of a number on, differences that are rounding errors of coordinates and momenta:
+    /// where constraints hold a mechanism at rest, all its motion is.
+    fn forgive(&mut self, first: usize, after: Halves<'_>, roundings: &dyn Fn() -> (f64, f64)) {
+        /// Differences below this part of the state itself are small beside the motion, or the state is at rest away
+        /// from the origin.
+        const SMALL: f64 = 1e-9;
+
+        for Compared { off, .. } in self.compared.iter_mut().skip(first) {
+            let (of_q, of_p) = off.split_at(after[0].len());
+            let sizes = [largest(of_q), largest(of_p)];
+            let mut pairs = sizes.iter().zip(after);
+            if pairs.all(|(size, after)| *size <= SMALL * largest(after)) {
+                continue;
+            }
+            let (q, p) = roundings();
+            if sizes[0] <= q && sizes[1] <= p {
+                off.fill(0.0);
+            }
         }
     }
 

@@ -167,7 +167,7 @@ where
         let (model, state) = (&endless.model, &endless.state);
         if let Some(stepper) = endless.sequence.stepper_mut() {
             let node = M::node(stepper, model, (t0, state), &velocity);
-            watch.pass(Recorded::of(&**model, &node, false), &|| 0.0);
+            watch.pass(Recorded::of(&**model, &node, false), &|_| 0.0);
             watch.add(model.weigh(&node));
             velocity = node.v;
         }
@@ -283,7 +283,7 @@ where
         self.resolution.look(M::statistics(stepper), &passed);
         let is_conserved = !has_impulses && M::CONSERVES;
         let recorded = Recorded::of(&**model, &node, is_conserved);
-        self.watch.pass(recorded, &|| model.rounding_at(&node));
+        (self.watch).pass(recorded, &|time| model.rounding_at(&node, time));
         Some(Ok(node))
     }
 
@@ -409,7 +409,7 @@ where
     fn push(&mut self, stepper: &mut L::Stepper<'m, M>, model: &M, at: (f64, &L::State)) {
         let node = M::node(stepper, model, at, self.velocity);
         // Actions change the energy.
-        self.watch.pass(Recorded::of(model, &node, false), &|| 0.0);
+        self.watch.pass(Recorded::of(model, &node, false), &|_| 0.0);
         self.velocity.clone_from(&node.v);
         self.last = node.t;
         self.rows.push(model, &node);

@@ -3,6 +3,7 @@
 use super::acting;
 use super::events::{Severed, Watched};
 use super::follow::{Follow, Passed};
+use super::rounding::roundings;
 use super::setup::Simulation;
 use crate::error::{RunError, RunErrorKind};
 use crate::evaluate::Evaluate;
@@ -94,29 +95,6 @@ where
         near(again.0, start.0, end.0, least_q) && near(again.1, start.1, end.1, least_p)
     };
     both((0.0, 0.0)) || both(roundings::<M, N, L>(model, (t, h), start))
-}
-
-/// By how much coordinates and momenta may change in a time `h` due to rounding errors of forces.
-fn roundings<M, const N: usize, L>(model: &M, (t, h): (f64, f64), state: &L::State) -> (f64, f64)
-where
-    M: Evaluate<N, L>,
-    L: Length<N>,
-{
-    /// The number of rounding errors of forces in an element.
-    const MANY: f64 = 16.0;
-
-    let (q, p) = L::parts(state);
-    let Some(v) = model.velocity(t, state, &L::zero(p)) else {
-        return (0.0, 0.0);
-    };
-    let impulse = MANY * (h * model.force_rounding(t, (q, p), &v)).abs();
-    let kicked = L::state(q.clone(), L::from_fn(p, |a| p.as_ref()[a] + impulse));
-    let Some(faster) = model.velocity(t, &kicked, &v) else {
-        return (0.0, impulse);
-    };
-    let pairs = faster.as_ref().iter().zip(v.as_ref());
-    let changes = pairs.map(|(faster, v)| (faster - v).abs());
-    (h.abs() * changes.fold(0.0, larger), impulse)
 }
 
 /// An event that has cut an element: an owned copy of [`Severed`].

@@ -42,7 +42,7 @@ impl Watch {
         motion: &Motion<N, L>,
         masses: Option<Warning>,
     ) {
-        self.pass(Recorded::last_of(motion, false), &|| 0.0);
+        self.pass(Recorded::last_of(motion, false), &|_| 0.0);
         self.add(masses);
     }
 
@@ -118,8 +118,9 @@ impl Watch {
         });
     }
 
-    /// Checks the energy of a recorded node; `rounding` returns the rounding error of the energy.
-    pub(super) fn pass(&mut self, node: Recorded, rounding: &dyn Fn() -> f64) {
+    /// Checks the energy of a recorded node; `rounding` returns the rounding error of the energy for the time since the
+    /// node before.
+    pub(super) fn pass(&mut self, node: Recorded, rounding: &dyn Fn(f64) -> f64) {
         let Recorded {
             time,
             energy,
@@ -137,10 +138,13 @@ impl Watch {
         // p·v is twice the kinetic energy of a Lagrangian. For other Hamiltonians half of it still serves as a scale.
         let kinetic = 0.5 * action.abs();
         self.energy.scale = self.energy.scale.max(kinetic);
-        let last = self.energy.last.replace(energy).filter(|_| is_conserved);
+        let last = self.energy.last.replace((time, energy));
+        let since = last.map_or(0.0, |(from, _)| time - from);
+        let last = last.filter(|_| is_conserved);
         let behind = (self.energy.bursts).pass((time, energy), kinetic, is_conserved);
-        let kinds = [last.map(|before| (before, self.energy.scale)), behind];
-        let is_one = |(before, scale): &(f64, f64)| is_jump([*before, energy], *scale, rounding);
+        let kinds = [last.map(|(_, before)| (before, self.energy.scale)), behind];
+        let is_one =
+            |(before, scale): &(f64, f64)| is_jump([*before, energy], *scale, &|| rounding(since));
         if let Some((before, _)) = kinds.into_iter().flatten().find(is_one) {
             self.jumps(time, before, energy);
             self.energy.bursts.before = None; // Each jump counts once.
@@ -198,7 +202,8 @@ pub(crate) fn is_jump([before, after]: [f64; 2], kinetic: f64, more: &dyn Fn() -
 /// The energy of the nodes so far.
 #[derive(Clone, Debug, Default)]
 struct Energy {
-    last: Option<f64>,
+    /// The time and the energy of the last node.
+    last: Option<(f64, f64)>,
     /// The largest kinetic energy so far.
     scale: f64,
     bursts: Bursts,

@@ -432,3 +432,64 @@ fn a_jump_of_a_constrained_position_is_an_error() {
     assert_eq!(*constraint, name);
     assert!((distance - 1e-5).abs() <= 1e-12, "{distance:e}");
 }
+
+/// A train of wheels under loads that balance; the last two wheels are idle, one of them without inertia. Rounding
+/// errors of loads up to about ten move nothing by more than 1e-12 of t².
+#[test]
+fn wheels_that_balance_stay_at_the_origin() {
+    const RATIO: f64 = 3.0;
+
+    #[dynamics(
+        coordinates(a[n]),
+        lagrangian = sum(i in 0..n, m[i]*dot(a[i])^2/2 - f[i]*a[i]),
+        constraint(mesh[i in 0..n-1]) = a[i] - r*a[i+1],
+    )]
+    struct Train {
+        n: usize,
+        m: Vec<f64>,
+        f: Vec<f64>,
+        r: f64,
+    }
+
+    let m = vec![1.0, 2.0, 0.5, 1.5, 1.0, 1.0, 0.0];
+    let mut f = vec![0.3, 0.7, -0.2, 0.45, 0.0, 0.0, 0.0];
+    // Each wheel passes the loads before it on to the next one.
+    let mut reactions: Vec<f64> = Vec::new();
+    for load in &f[..4] {
+        let before = reactions.last().unwrap_or(&0.0);
+        reactions.push(load + RATIO * before);
+    }
+    f[4] = -RATIO * reactions[3];
+    reactions.extend([0.0, 0.0]);
+    let (n, r) = (m.len(), RATIO);
+    let train = Train { n, m, f, r };
+    let start = || train.state(vec![0.0; n], vec![0.0; n]);
+    for element in [Element::mixed(2), Element::mixed(4), Element::mixed(7)] {
+        for h in [1.0, 0.1, 0.001] {
+            let simulation = Simulation::new(&train).element(element).step(h);
+            let motion = simulation.run(start(), 0.0..10.0 * h).expect("it stays");
+            let end = motion.last();
+            let (moved, moves) = (worst(&end.q, &[]), worst(&end.v, &[]));
+            assert!(
+                moved <= 1e-12 * h * h && moves <= 1e-12 * h,
+                "{h}: {moved:e} {moves:e}"
+            );
+            let found = motion.reactions().row(7).expect("a node");
+            let off = worst(found, &reactions);
+            assert!(off <= 1e-12, "{h}: {found:?}");
+            assert!(motion.warnings().is_empty(), "{:?}", motion.warnings());
+            let iterations = motion.statistics().iterations;
+            assert!(iterations <= 400, "{iterations}");
+        }
+    }
+}
+
+/// The largest difference, from zeros where there are no others.
+fn worst(found: &[f64], expected: &[f64]) -> f64 {
+    let expected = expected.iter().copied().chain(std::iter::repeat(0.0));
+    let off = found
+        .iter()
+        .zip(expected)
+        .map(|(one, other)| (one - other).abs());
+    off.fold(0.0, larger)
+}

@@ -4,6 +4,7 @@
 //! Elements satisfy them exactly at their nodes. This module treats a single instant: the velocity that belongs to a
 //! momentum under constraints, the residuals of the constraints, and which rows are linearly independent.
 
+pub(crate) mod at_rest;
 mod balance;
 pub(crate) mod choose;
 mod combine;
@@ -17,6 +18,8 @@ mod instant;
 pub(crate) mod layout;
 pub(crate) mod node;
 pub(crate) mod own;
+#[cfg(feature = "alloc")]
+pub(crate) mod reach;
 pub(crate) mod residual;
 pub(crate) mod rows;
 mod scaled;
@@ -31,12 +34,16 @@ pub(crate) mod trail;
 mod velocity_slope;
 
 pub use crate::control::START_TOLERANCE;
+#[cfg(feature = "std")]
+pub use at_rest::start_residuals;
+#[cfg(feature = "alloc")]
+pub use at_rest::{reaction_rounding, work_of_roundings};
 #[cfg(feature = "alloc")]
 pub use held_velocity::HeldVelocity;
 #[cfg(feature = "alloc")]
 pub use instant::{Gradients, gradients, reactions};
 #[cfg(feature = "std")]
-pub use start::{Scales, own_residuals, start_residuals};
+pub use start::{Scales, own_residuals};
 #[cfg(feature = "alloc")]
 pub use states::{Residual, independent, residuals, units, velocity, velocity_for, velocity_of};
 #[cfg(feature = "alloc")]

@@ -1,8 +1,9 @@
 //! Steps of models with constraints, by Newton's method with multipliers.
 
+use crate::constrained::at_rest::{is_rounding, work_of_roundings};
 use crate::constrained::choose::choose;
 use crate::constrained::constrains::Constrains;
-use crate::constrained::element::{ConstrainedForm, ElementConstraints};
+use crate::constrained::element::{ConstrainedForm, ElementConstraints, IsRounding};
 use crate::constrained::layout::{Layout, check_element};
 use crate::constrained::node::{Bordered, own_velocity, solve_velocity};
 use crate::constrained::own::violated;
@@ -49,6 +50,7 @@ where
         times: (t, h),
         start: state,
         warm,
+        is_rounding: &|row, t, at| is_rounding(model, row, (t, h), at),
     };
     let mut rows = Rows::at_start(parts.rows, model, t, &state.q);
     let mut scratch = Scratch {
@@ -91,7 +93,11 @@ where
         let velocities = [begun.velocity, constraints.end_place(scratch.unknowns).2];
         Energy::with(model, (t, h), [state, &end], &velocities)
     });
-    let rounding = || rounding(model, (t, h), [state, &end]);
+    let end_velocity = constraints.end_place(scratch.unknowns).2;
+    let rounding = || {
+        rounding(model, (t, h), [state, &end])
+            + work_of_roundings(model, (t, h), &end.q, &end_velocity)
+    };
     evidence.check_with(method.control.solve, energy, scheme.element, &rounding)?;
     // Between steps the rows are those of the constraints as declared.
     constraints
@@ -122,6 +128,7 @@ struct Step<'a, const N: usize> {
     start: &'a State<N>,
     /// Whether the unknowns continue the last step, or are foreseen.
     warm: bool,
+    is_rounding: &'a IsRounding<'a, N>,
 }
 
 /// What a step begins with.
@@ -272,10 +279,11 @@ impl<const N: usize> Step<'_, N> {
     /// Refuses a start to which the motion has led, with velocity `v`, but whose positions constraints do not allow: their
     /// values jump there.
     fn check_continuity(&self, v: &[f64; N], rows: &Rows<'_, N>) -> Result<(), StepError> {
-        let gap = largest_gap(norm(&self.start.q), norm(v), self.times);
+        let (q, (t, _)) = (&self.start.q, self.times);
+        let gap = largest_gap(norm(q), norm(v), self.times);
         for (c, constraint) in self.model.declared().iter().enumerate() {
             let distance = rows.distance(c);
-            if distance > gap {
+            if distance > gap && !(self.is_rounding)((rows, c), t, (q, v)) {
                 return Err(ConstraintError::Discontinuous {
                     constraint: CoordinateName::single(constraint.name),
                     distance,
@@ -300,18 +308,21 @@ impl<const N: usize> Step<'_, N> {
             }
             .into())
         };
+        let is_rounding = |c| (self.is_rounding)((rows, c), t, (q, &v));
         for c in 0..declared.len() {
             let (position, velocity) = relative_residual(rows, c, q, &v, h);
             for (residual, is_position) in [(position, true), (velocity, false)] {
-                if !(residual <= START_TOLERANCE) {
+                if !(residual <= START_TOLERANCE || is_rounding(c)) {
                     return refused(c, is_position, residual);
                 }
             }
         }
         let as_declared = (!rows.is_combined()).then_some(rows);
         match violated(model, t, (q, &v), (h, self.control.tolerance), as_declared) {
-            Some((c, is_position, residual)) => refused(c, is_position, residual),
-            None => Ok(()),
+            Some((c, is_position, residual)) if !is_rounding(c) => {
+                refused(c, is_position, residual)
+            }
+            _ => Ok(()),
         }
     }
 
@@ -325,7 +336,12 @@ impl<const N: usize> Step<'_, N> {
         if !end.is_finite() {
             return Err(StepError::NonFinite);
         }
-        constraints.check_end(self.model, unknowns, self.control.tolerance)
+        constraints.check_end(
+            self.model,
+            unknowns,
+            self.control.tolerance,
+            self.is_rounding,
+        )
     }
 }
 

@@ -89,6 +89,10 @@ impl Default for Control {
 /// summed over the points of an element.
 pub(crate) const POSITION_ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
+/// Increments below this size are rounding errors of ill-conditioned equations, if they have not decreased for some
+/// time.
+pub(crate) const ROUGH_ROUND_OFF: f64 = 1e-10;
+
 /// How much a start may violate the constraints, relative to the extent of the motion. The first element removes the
 /// rest.
 pub const START_TOLERANCE: f64 = 1e-8;

@@ -51,6 +51,13 @@ pub(crate) trait Equations {
     /// After Newton's method, updates to the final x what the end of the step depends on.
     fn finish(&mut self, x: &[f64], scratch: &mut [f64]) -> Result<(), StepError>;
 
+    /// The increment, measured beside what the reactions of constraints alone would move, if it is a rounding error of
+    /// that (T-168).
+    #[cfg(feature = "alloc")]
+    fn measure_at_rest(&self, _x: &[f64], _step: &[f64]) -> Option<Increment> {
+        None
+    }
+
     /// The counts of evaluations and iterations.
     fn statistics(&mut self) -> &mut Statistics;
 }

@@ -9,6 +9,8 @@
 #[cfg(feature = "sparse")]
 mod allowed;
 #[cfg(feature = "sparse")]
+mod at_rest;
+#[cfg(feature = "sparse")]
 mod backwards;
 #[cfg(feature = "sparse")]
 mod blocked;
@@ -198,6 +200,34 @@ pub fn energy_rounding<M: Model>(model: &M, t: f64, (q, p): (&[f64], &[f64]), v:
     };
     let bounds = model.energy_function(exactly(&t), &exact(q), &exact(z));
     bounds.width()
+}
+
+/// A bound of the rounding errors of forces that reactions balance; see
+/// [`constrained::reaction_rounding`](crate::constrained::reaction_rounding).
+#[must_use]
+#[cold]
+pub fn reaction_rounding<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> f64 {
+    #[cfg(feature = "sparse")]
+    return at_rest::reaction_rounding(model, t, q, v);
+    #[cfg(not(feature = "sparse"))]
+    {
+        let _ = (model, t, q, v);
+        0.0
+    }
+}
+
+/// What rounding errors of the balance of forces may change of the energy in a time h, (t, h) being `times`; see
+/// [`constrained::work_of_roundings`](crate::constrained::work_of_roundings).
+#[must_use]
+#[cold]
+pub fn work_of_roundings<M: Model>(model: &M, times: (f64, f64), q: &[f64], v: &[f64]) -> f64 {
+    #[cfg(feature = "sparse")]
+    return at_rest::work_of_roundings(model, times, q, v);
+    #[cfg(not(feature = "sparse"))]
+    {
+        let _ = (model, times, q, v);
+        0.0
+    }
 }
 
 /// The possible rounding error of forces; see [`legendre::force_rounding`](crate::legendre::force_rounding).

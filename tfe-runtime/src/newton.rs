@@ -1,6 +1,6 @@
 //! The nonlinear iterations of an element: fixed-point iteration first, simplified Newton iteration where it is needed.
 
-use crate::control::POSITION_ROUND_OFF;
+use crate::control::{POSITION_ROUND_OFF, ROUGH_ROUND_OFF};
 use crate::equations::{Equations, Increment};
 use crate::error::StepError;
 use crate::evidence::Evidence;
@@ -42,9 +42,6 @@ impl Asked for Standard {
 
 /// Increments below this size are rounding errors of the residual, if they no longer decrease.
 pub(crate) const ROUND_OFF: f64 = 4096.0 * f64::EPSILON;
-
-/// The same for ill-conditioned Newton matrices, if the increments have not decreased for some time.
-pub(crate) const ROUGH_ROUND_OFF: f64 = 1e-10;
 
 /// The same for large stiff models, whose residuals are differences of forces that are many orders of magnitude larger.
 #[cfg(feature = "sparse")]
@@ -124,6 +121,9 @@ pub(crate) struct Monitor {
     idle: u32,
     /// The last increment relative to the size of each coordinate.
     own: f64,
+    /// Whether increments are measured beside what reactions would move.
+    #[cfg(feature = "alloc")]
+    rests: bool,
 }
 
 /// One accidentally small increment must not end an iteration: the convergence estimate uses at least this fraction of
@@ -172,6 +172,8 @@ impl Monitor {
             best: f64::INFINITY,
             idle: 0,
             own: f64::INFINITY,
+            #[cfg(feature = "alloc")]
+            rests: false,
         }
     }
 
@@ -275,6 +277,34 @@ impl Monitor {
         } else {
             Verdict::GoOn
         })
+    }
+
+    /// The increment, or, of a mechanism that constraints hold at rest, the one that `beside` measures beside what the
+    /// reactions would move (T-168): the velocities are rounding errors of the balance of forces there.
+    #[cfg(feature = "alloc")]
+    pub(crate) fn beside_reactions(
+        &mut self,
+        increment: Increment,
+        iteration: u32,
+        beside: &dyn Fn() -> Option<Increment>,
+    ) -> Increment {
+        // Infinite where the step leads to zero velocities.
+        let is_far = increment.relative > Evidence::FAR;
+        let is_doubtful = is_far && (iteration > 0 || increment.relative == f64::INFINITY);
+        if !(self.rests || is_doubtful || self.idle >= IDLE) {
+            return increment;
+        }
+        let Some(beside) = beside() else {
+            return increment;
+        };
+        if !self.rests {
+            // Sizes relative to the state say nothing of those that follow.
+            *self = Self {
+                rests: true,
+                ..Self::new(self.tolerance)
+            };
+        }
+        beside
     }
 
     /// Judges an increment, and, once increments relative to the largest coordinate have converged, what `own`
@@ -524,6 +554,10 @@ pub(crate) fn newton(
         statistics.iterations += 1;
         statistics.newton_iterations += 1;
         let increment = equations.measure(unknowns, step);
+        #[cfg(feature = "alloc")]
+        let increment = monitor.beside_reactions(increment, iteration, &|| {
+            equations.measure_at_rest(unknowns, step)
+        });
         own |= fresh;
         evidence.see(increment, own);
         let own_increment = || equations.measure_own(unknowns, step);
@@ -555,42 +589,4 @@ pub(crate) fn newton(
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Rounding errors of larger coordinates do not shrink.
-    #[test]
-    fn small_coordinates_settle_while_increments_shrink() {
-        let end_of = |sequence: &[f64]| {
-            let mut monitor = Monitor::new(1e-17);
-            let ends = |own: &f64| matches!(monitor.settle(*own), Ok(Verdict::Converged));
-            sequence.iter().position(ends)
-        };
-        assert_eq!(end_of(&[1e-6, 1e-9, 1e-12, 1e-15, 1e-18]), Some(3));
-        assert_eq!(end_of(&[1e-6, 1e-9, 0.95e-9]), Some(2));
-        assert_eq!(end_of(&[0.0]), Some(0));
-        assert_eq!(end_of(&[1e-6, f64::NAN, f64::NAN]), None);
-    }
-
-    /// The cheap way out decides as the power itself does.
-    #[test]
-    fn hopeless_is_what_the_rate_never_brings_to_the_target() {
-        for remaining in [0, 1, 7, 8, 9, 40, 100] {
-            for tenths in 0..=25 {
-                let rate = f64::from(tenths) / 20.0;
-                for exponent in -60..=10 {
-                    let last = 1.7 * 2.0_f64.powi(exponent);
-                    let mut monitor = Monitor::new(1e-13);
-                    (monitor.last, monitor.rate) = (last, rate);
-                    let target = 1e-13;
-                    let by_power = last > target && last * integer_power(rate, remaining) > target;
-                    assert_eq!(
-                        monitor.is_hopeless(remaining as u32),
-                        by_power,
-                        "{last} · {rate}^{remaining}"
-                    );
-                }
-            }
-        }
-    }
-}
+mod tests;

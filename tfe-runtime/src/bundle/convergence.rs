@@ -1,7 +1,8 @@
 //! The convergence monitor of single trajectories for several lanes at once, without branches.
 
+use crate::control::ROUGH_ROUND_OFF;
 use crate::evidence::Evidence;
-use crate::newton::{IDLE, MAX_IDLE, ROUGH_ROUND_OFF, ROUND_OFF, Solve, of_fixed_point};
+use crate::newton::{IDLE, MAX_IDLE, ROUND_OFF, Solve, of_fixed_point};
 use crate::real::Real;
 use crate::registers::pair::Eight;
 

@@ -15,6 +15,8 @@
 use crate::constrained::constrains::Constrains;
 use crate::constrained::layout::Layout;
 use crate::constrained::own::violated;
+#[cfg(feature = "alloc")]
+use crate::constrained::reach::{diagonal, sparse, speeds};
 use crate::constrained::residual::relative_residual;
 use crate::constrained::rows::Rows;
 use crate::control::{POSITION_ROUND_OFF, START_TOLERANCE};
@@ -27,6 +29,8 @@ use crate::scheme::SchemeRef;
 use crate::statistics::Statistics;
 use crate::unlike::{by_coordinate, own_increment, raise};
 use crate::velocity_form::{PointDerivatives, VelocityForm};
+#[cfg(feature = "alloc")]
+use {crate::control::ROUGH_ROUND_OFF, alloc::vec::Vec};
 
 pub(crate) struct ConstrainedForm<'a, M, const N: usize> {
     /// The element without constraints; its `momenta` become L_v at the points, its `forces` all forces there.
@@ -53,6 +57,10 @@ pub(crate) struct ElementConstraints<'a, const N: usize> {
     /// Whether holonomic constraints act at the points.
     pub(super) on_positions: bool,
 }
+
+/// Whether the violation of a constraint, by positions and velocities at a time, is a rounding error.
+pub(crate) type IsRounding<'a, const N: usize> =
+    dyn Fn((&Rows<'_, N>, usize), f64, (&[f64; N], &[f64; N])) -> bool + 'a;
 
 /// A point of the element.
 pub(super) struct Place<const N: usize> {
@@ -236,13 +244,14 @@ impl<const N: usize> ElementConstraints<'_, N> {
         low
     }
 
-    /// Checks that all constraints hold at the end, including those that were omitted as dependent. These are not
-    /// solved for, so that they are also compared with the size of their own terms.
+    /// Checks that all constraints hold at the end up to roundings, including those that were omitted as
+    /// dependent. These are not solved for, so that they are also compared with the size of their own terms.
     pub(crate) fn check_end(
         &mut self,
         model: &dyn Constrains<N>,
         x: &[f64],
         tolerance: f64,
+        is_rounding: &IsRounding<'_, N>,
     ) -> Result<(), StepError> {
         let (t, q, v) = self.end_place(x);
         let (declared, h) = (model.declared(), self.span.h);
@@ -255,10 +264,11 @@ impl<const N: usize> ElementConstraints<'_, N> {
             }
             .into())
         };
+        let is_rounding = |c| is_rounding((rows, c), t, (&q, &v));
         for c in 0..declared.len() {
             let (position, velocity) = relative_residual(rows, c, &q, &v, h);
             for residual in [position, velocity] {
-                if !(residual <= START_TOLERANCE) {
+                if !(residual <= START_TOLERANCE || is_rounding(c)) {
                     return refused(c, residual);
                 }
             }
@@ -267,8 +277,8 @@ impl<const N: usize> ElementConstraints<'_, N> {
             return Ok(());
         }
         match violated(model, t, (&q, &v), (h, tolerance), Some(rows)) {
-            Some((c, _, residual)) => refused(c, residual),
-            None => Ok(()),
+            Some((c, _, residual)) if !is_rounding(c) => refused(c, residual),
+            _ => Ok(()),
         }
     }
 
@@ -285,6 +295,44 @@ impl<const N: usize> ElementConstraints<'_, N> {
             inner.relative
         };
         Increment { relative, ..inner }
+    }
+
+    /// The size of an increment, and of the velocities, relative to the velocities that the reactions alone would cause;
+    /// `None` if they are no rounding errors of these.
+    #[cfg(feature = "alloc")]
+    #[cold]
+    #[inline(never)]
+    fn measure_beside_reactions(
+        &self,
+        model: &dyn Constrains<N>,
+        x: &[f64],
+        step: &[f64],
+    ) -> Option<Increment> {
+        let (t, q, v) = self.end_place(x);
+        let (_, mass) = model.momentum_and_mass(t, &q, &v, &mut [0.0; N]).ok()?;
+        let reaction = |c| {
+            let inside = (0..self.layout.degree()).map(|j| self.layout.inside(j, c));
+            let places = inside.chain([self.layout.node(c)]);
+            places.map(|at| x[at].abs()).sum()
+        };
+        let reactions: Vec<f64> = (0..self.rows.rows.len()).map(reaction).collect();
+        let (rows, masses) = (sparse(self.rows.rows), diagonal(&mass));
+        let speeds = speeds(self.span.h, &masses, &rows, &reactions);
+        // At rest the velocities themselves are rounding errors.
+        let (steps, rates) = (self.largest_rates(step), self.largest_rates(x));
+        let mut size = 0.0;
+        for a in 0..N {
+            for rate in [steps[a], rates[a]] {
+                if rate != 0.0 {
+                    raise(&mut size, rate / speeds[a]);
+                }
+            }
+        }
+        let increment = Increment {
+            relative: size,
+            position: size,
+        };
+        (size <= ROUGH_ROUND_OFF).then_some(increment)
     }
 
     /// The largest of the rates x of each coordinate, and of its velocity at the end.
@@ -428,6 +476,11 @@ where
 
     fn measure(&self, x: &[f64], step: &[f64]) -> Increment {
         self.constraints.measure(x, step)
+    }
+
+    #[cfg(feature = "alloc")]
+    fn measure_at_rest(&self, x: &[f64], step: &[f64]) -> Option<Increment> {
+        (self.constraints).measure_beside_reactions(self.inner.model, x, step)
     }
 
     fn measure_own(&self, x: &[f64], step: &[f64]) -> Option<f64> {

@@ -21,7 +21,7 @@ pub(crate) fn relative_residual<const N: usize>(
 ) -> (f64, f64) {
     let length = norm(&rows.rows[c]);
     let length = if length > 0.0 { length } else { 1.0 };
-    let extent = reach(norm(q), norm(v), h);
+    let extent = farthest(norm(q), norm(v), h);
     let speed = norm(v)
         .max(rows.drift[c].abs() / length)
         .max(REST * extent / h.abs());
@@ -35,11 +35,11 @@ pub(crate) fn relative_residual<const N: usize>(
 /// that reach this far and this speed. Farther away the constraints must have jumped.
 pub(crate) fn largest_gap(extent: f64, speed: f64, (t, h): (f64, f64)) -> f64 {
     let rounding = BEHIND * f64::EPSILON * t.abs() * speed;
-    START_TOLERANCE * reach(extent, speed, h) + rounding
+    START_TOLERANCE * farthest(extent, speed, h) + rounding
 }
 
 /// How far positions reach, or move in a step of length h: a motion may lead them through zero.
-pub(crate) fn reach(extent: f64, speed: f64, h: f64) -> f64 {
+pub(crate) fn farthest(extent: f64, speed: f64, h: f64) -> f64 {
     extent.max(h.abs() * speed)
 }
 

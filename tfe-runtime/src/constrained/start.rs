@@ -25,23 +25,8 @@ pub struct Scales {
     pub tolerance: f64,
 }
 
-/// As [`residuals`](super::residuals), for a start: the violation of a holonomic constraint is also compared with the
-/// size of its own terms, and the larger relative violation counts (T-165).
-#[must_use]
-pub fn start_residuals<M, const N: usize>(
-    model: &M,
-    t: f64,
-    q: &[f64; N],
-    v: &[f64; N],
-    h: f64,
-) -> Vec<Residual>
-where
-    M: Model<N>,
-{
-    start_residuals_of(model, t, (q, v), h)
-}
-
-fn start_residuals_of<const N: usize>(
+/// The larger one of the violations of each constraint relative to all positions and to its own terms.
+pub(super) fn start_residuals_of<const N: usize>(
     model: &dyn Constrains<N>,
     t: f64,
     (q, v): (&[f64; N], &[f64; N]),

@@ -156,10 +156,7 @@ impl Legendre {
 
 /// The diagonal of ∂²/∂z∂z; fails if one of its entries is zero, or if there are entries off the diagonal.
 fn diagonal<M: Model>(model: &M, t: f64, q: &[f64], z: &[f64]) -> Result<Vec<f64>, ModelError> {
-    let mut found = Diagonal {
-        entries: vec![0.0; model.len()],
-        off: None,
-    };
+    let mut found = Diagonal::new(model.len());
     model.mass(t, q, z, &mut found);
     if let Some((row, column)) = found.off {
         return Err(ModelError::MassNotDiagonal { row, column });
@@ -170,9 +167,26 @@ fn diagonal<M: Model>(model: &M, t: f64, q: &[f64], z: &[f64]) -> Result<Vec<f64
     }
 }
 
+/// The diagonal of L_vv.
+#[cfg(feature = "sparse")]
+pub(super) fn masses<M: Model>(model: &M, t: f64, q: &[f64], v: &[f64]) -> Vec<f64> {
+    let mut found = Diagonal::new(model.len());
+    model.mass(t, q, v, &mut found);
+    found.entries
+}
+
 struct Diagonal {
     entries: Vec<f64>,
     off: Option<(usize, usize)>,
+}
+
+impl Diagonal {
+    fn new(len: usize) -> Self {
+        Self {
+            entries: vec![0.0; len],
+            off: None,
+        }
+    }
 }
 
 impl Entries<f64> for Diagonal {

@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 /// The bordered matrix of one instant, whose elimination ordering is computed once.
 #[derive(Clone, Debug)]
 pub(super) struct Instant {
-    rows: Rows,
+    pub(super) rows: Rows,
     node: Node,
 }
 

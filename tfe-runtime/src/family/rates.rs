@@ -10,25 +10,26 @@
 //! It is a simplified Newton iteration with one sparse matrix for rates and multipliers; its factors are kept while
 //! they contract well enough, also from step to step.
 
+use super::at_rest::sparse;
 use super::blocked::Blocked;
 use super::dense::DenseElement;
 use super::held::Solved;
-use super::inertia::Legendre;
+use super::inertia::masses;
 use super::model::{FamilyState, Gradient, Model};
 use super::node::Node;
 use super::pattern::Pattern;
 use super::point::Point;
 use super::rows::Rows;
 use super::settling::Declarations;
-use super::start::violated;
+use super::start::Start;
 use super::tangent::Parts;
 use crate::basis::legendre_slopes;
 use crate::consistency::ModelError;
-use crate::constrained::residual::{REST, largest_gap, reach};
-use crate::control::{POSITION_ROUND_OFF, START_TOLERANCE};
+use crate::constrained::reach::speeds;
+use crate::control::{POSITION_ROUND_OFF, ROUGH_ROUND_OFF};
 use crate::double_double::DoubleDouble;
 use crate::equations::{Increment, relative};
-use crate::error::{ConstraintError, StepError};
+use crate::error::StepError;
 use crate::evidence::Evidence;
 use crate::legendre::largest;
 use crate::method::{continued_ratio, set_extrapolation};
@@ -197,19 +198,14 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         self.start_rows.copy_from_slice(&self.rows.values);
         match last {
             Some(length) => {
-                self.check_continuity(&self.v_end, (t, h))?;
+                self.check_start(true, (t, h))?;
                 self.continue_rates(h / length);
             }
             None => {
                 self.low.q.fill(0.0);
                 self.low.p.fill(0.0);
                 self.begin(t)?;
-                if self.is_behind_kink {
-                    let before = self.own_velocity(t);
-                    self.check_continuity(before.as_ref().unwrap_or(&self.v_end), (t, h))?;
-                } else {
-                    self.check_start(t, h)?;
-                }
+                self.check_start(false, (t, h))?;
             }
         }
         let outcome = self.newton(t, h);
@@ -261,83 +257,23 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
         Ok(())
     }
 
-    /// The velocity that belongs to the momentum of the start without regard to the constraints; `None` if that is the
-    /// admissible one, or if there is none.
-    fn own_velocity(&self, t: f64) -> Option<Vec<f64>> {
-        /// Momenta that differ by less have velocities that are the same, as far as starts are checked.
-        const SAME: f64 = 1e-12;
-
-        let mut pairs = self.start.p.iter().zip(&self.node.slope);
-        let differ = |(p, slope): (&f64, &f64)| (p - slope).abs() > SAME * (p.abs() + slope.abs());
-        let differ = pairs.any(differ);
-        let velocity = || Legendre::default().velocity(&*self.model, t, &self.start);
-        differ.then(velocity)?.ok()
-    }
-
-    /// Refuses a start to which the motion has led, with velocity `v`, but whose positions constraints do not allow: their
-    /// values jump there.
-    fn check_continuity(&self, v: &[f64], times: (f64, f64)) -> Result<(), StepError> {
+    /// Refuses a start that violates the constraints, or to which the motion has led although they jump there.
+    fn check_start(&self, has_led: bool, times: (f64, f64)) -> Result<(), StepError> {
         if self.constraints == 0 || !self.refuses {
             return Ok(());
         }
-        let gap = largest_gap(largest(&self.start.q), largest(v), times);
-        let distances = self.rows.distances();
-        match distances.iter().position(|distance| *distance > gap) {
-            Some(row) => Err(ConstraintError::Discontinuous {
-                constraint: self.model.constraint_name(row),
-                distance: distances[row],
-            }
-            .into()),
-            None => Ok(()),
-        }
-    }
-
-    /// Refuses a start that violates the constraints.
-    fn check_start(&mut self, t: f64, h: f64) -> Result<(), StepError> {
-        if self.constraints == 0 || !self.refuses {
-            return Ok(());
-        }
-        let extent = reach(largest(&self.start.q), largest(&self.v_end), h);
-        let refused = |row: usize, position: bool, residual: f64| {
-            let constraint = self.model.constraint_name(row);
-            Err(ConstraintError::Start {
-                constraint,
-                position,
-                residual,
-            }
-            .into())
+        let start = Start {
+            state: &self.start,
+            rows: &self.rows,
+            node: &self.node,
+            admitted: &self.v_end,
+            tolerance: self.control.with_constraints().tolerance,
         };
-        for (row, distance) in self.rows.distances().into_iter().enumerate() {
-            if !(distance <= START_TOLERANCE * extent || distance == 0.0) {
-                return refused(row, true, distance / extent);
-            }
+        match (has_led, self.is_behind_kink) {
+            (true, _) => start.check_continuity(&*self.model, times, &self.v_end),
+            (false, true) => start.check_behind(&*self.model, times),
+            (false, false) => start.check(&*self.model, times),
         }
-        let v = self.own_velocity(t);
-        let at = (&self.start.q[..], v.as_deref());
-        let tolerance = self.control.with_constraints().tolerance;
-        let found = violated(&*self.model, (t, h), at, &self.rows, tolerance);
-        if let Some((row, position, part)) = found {
-            return refused(row, position, part);
-        }
-        // If the start violates the constraints, the admissible velocity belongs to another momentum.
-        let off = self.start.p.iter().zip(&self.node.slope);
-        let off: Vec<f64> = off.map(|(p, slope)| p - slope).collect();
-        let off = largest(&off);
-        let impulse =
-            largest(&self.start.p).max(REST * extent / h.abs() * self.node.largest_mass());
-        if !(off <= START_TOLERANCE * impulse || off == 0.0) {
-            let lengths = self.rows.lengths();
-            let shares = self.node.multipliers().iter().zip(lengths);
-            let (row, _) = shares
-                .map(|(eta, length)| (eta * length).abs())
-                .enumerate()
-                .fold(
-                    (0, 0.0),
-                    |most, one| if one.1 > most.1 { one } else { most },
-                );
-            return refused(row, false, off / impulse);
-        }
-        Ok(())
     }
 
     fn newton(&mut self, t: f64, h: f64) -> Result<(), StepError> {
@@ -366,6 +302,8 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             self.statistics.iterations += 1;
             self.statistics.newton_iterations += 1;
             let increment = self.measure(h);
+            let beside = || self.measure_at_rest(t, h);
+            let increment = monitor.beside_reactions(increment, iteration, &beside);
             own |= fresh;
             evidence.see(increment, own);
             match monitor.judge_each((increment, &control), &mut settles, || self.measure_own(h)) {
@@ -418,6 +356,33 @@ impl<M: Model, H: Deref<Target = M>> Rates<H> {
             let of = |numbers: &[f64]| largest(&numbers[a * count..(a + 1) * count]);
             (of(&self.unknowns), of(&self.step))
         })
+    }
+
+    /// The last increment, and the rates, beside what the reactions alone would move, if they are rounding errors of that
+    /// (T-168).
+    #[cold]
+    fn measure_at_rest(&self, t: f64, h: f64) -> Option<Increment> {
+        if self.constraints == 0 {
+            return None;
+        }
+        let count = self.table.view().unknowns();
+        let (rates, multipliers) = self.unknowns.split_at(self.start.q.len() * count);
+        let reactions = multipliers.chunks_exact(count);
+        let reactions: Vec<f64> = reactions.map(|m| m.iter().map(|m| m.abs()).sum()).collect();
+        let v: Vec<f64> = rates.chunks_exact(count).map(|rates| rates[0]).collect();
+        let masses = masses(&*self.model, t, &self.start.q, &v);
+        let speeds = speeds(h, &masses, &sparse(&self.rows), &reactions);
+        // At rest the velocities themselves are rounding errors.
+        let pairs = [&self.step[..], rates].into_iter().flat_map(|all| {
+            let sizes = all.chunks_exact(count).map(largest);
+            sizes.zip(&speeds).filter(|(size, _)| *size != 0.0)
+        });
+        let size = largest(&pairs.map(|(size, speed)| size / speed).collect::<Vec<_>>());
+        let increment = Increment {
+            relative: size,
+            position: size,
+        };
+        (size <= ROUGH_ROUND_OFF).then_some(increment)
     }
 
     /// Evaluates the model at the points, and the constraints at the end.

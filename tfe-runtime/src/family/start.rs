@@ -1,13 +1,138 @@
 //! The violation of constraints by a start, relative to the size of the terms of each constraint (T-165).
 
-use super::model::Model;
+use super::at_rest::are_roundings;
+use super::inertia::Legendre;
+use super::model::{FamilyState, Model};
+use super::node::Node;
 use super::pattern::Pattern;
 use super::rows::Rows;
+use crate::constrained::residual::{REST, farthest, largest_gap};
 use crate::control::{POSITION_ROUND_OFF, START_TOLERANCE};
 use crate::enclosure::Enclosure;
+use crate::error::{ConstraintError, StepError};
 use crate::legendre::largest;
 use alloc::vec;
 use alloc::vec::Vec;
+
+/// A start, with what is known of it.
+pub(super) struct Start<'a> {
+    pub(super) state: &'a FamilyState,
+    /// The rows at its coordinates.
+    pub(super) rows: &'a Rows,
+    /// Where the velocity that the constraints admit was found.
+    pub(super) node: &'a Node,
+    /// That velocity.
+    pub(super) admitted: &'a [f64],
+    /// The error that iterations may leave, relative to all positions or velocities.
+    pub(super) tolerance: f64,
+}
+
+impl Start<'_> {
+    /// Refuses a start that violates the constraints by more than the rounding errors of a mechanism at rest.
+    pub(super) fn check<M: Model>(&self, model: &M, times: (f64, f64)) -> Result<(), StepError> {
+        let own = self.own_velocity(model, times.0);
+        let Some((row, position, residual)) = self.violation(model, times, own.as_deref()) else {
+            return Ok(());
+        };
+        let v = own.as_deref().unwrap_or(self.admitted);
+        if are_roundings(model, times, (&self.state.q, v), self.rows, &self.off()) {
+            return Ok(());
+        }
+        let constraint = model.constraint_name(row);
+        Err(ConstraintError::Start {
+            constraint,
+            position,
+            residual,
+        }
+        .into())
+    }
+
+    /// Refuses a start to which the motion has led, with velocity `v`, but whose positions constraints do not allow: their
+    /// values jump there.
+    pub(super) fn check_continuity<M: Model>(
+        &self,
+        model: &M,
+        times: (f64, f64),
+        v: &[f64],
+    ) -> Result<(), StepError> {
+        let q = &self.state.q;
+        let gap = largest_gap(largest(q), largest(v), times);
+        let distances = self.rows.distances();
+        match distances.iter().position(|distance| *distance > gap) {
+            Some(row) if !are_roundings(model, times, (q, v), self.rows, &[]) => {
+                Err(ConstraintError::Discontinuous {
+                    constraint: model.constraint_name(row),
+                    distance: distances[row],
+                }
+                .into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The same behind a kink of constraints, where it may have a velocity that they only allowed before.
+    pub(super) fn check_behind<M: Model>(
+        &self,
+        model: &M,
+        times: (f64, f64),
+    ) -> Result<(), StepError> {
+        let before = self.own_velocity(model, times.0);
+        let v = before.as_deref().unwrap_or(self.admitted);
+        self.check_continuity(model, times, v)
+    }
+
+    /// The part of the momenta that the constraints do not allow.
+    fn off(&self) -> Vec<f64> {
+        let pairs = self.state.p.iter().zip(&self.node.slope);
+        pairs.map(|(p, slope)| p - slope).collect()
+    }
+
+    /// The velocity that belongs to the momentum without regard to the constraints; `None` if that is the admissible
+    /// one, or if there is none.
+    fn own_velocity<M: Model>(&self, model: &M, t: f64) -> Option<Vec<f64>> {
+        /// Momenta that differ by less have velocities that are the same, as far as starts are checked.
+        const SAME: f64 = 1e-12;
+
+        let mut pairs = self.state.p.iter().zip(&self.node.slope);
+        let differ = |(p, slope): (&f64, &f64)| (p - slope).abs() > SAME * (p.abs() + slope.abs());
+        let differ = pairs.any(differ);
+        let velocity = || Legendre::default().velocity(model, t, self.state);
+        differ.then(velocity)?.ok()
+    }
+
+    /// The first constraint that is violated: whether by positions, and the relative violation.
+    fn violation<M: Model>(
+        &self,
+        model: &M,
+        (t, h): (f64, f64),
+        own: Option<&[f64]>,
+    ) -> Option<(usize, bool, f64)> {
+        let (FamilyState { q, p }, rows) = (self.state, self.rows);
+        let extent = farthest(largest(q), largest(self.admitted), h);
+        for (row, distance) in rows.distances().into_iter().enumerate() {
+            if !(distance <= START_TOLERANCE * extent || distance == 0.0) {
+                return Some((row, true, distance / extent));
+            }
+        }
+        let found = violated(model, (t, h), (q, own), rows, self.tolerance);
+        if found.is_some() {
+            return found;
+        }
+        // If the start violates the constraints, the admissible velocity belongs to another momentum.
+        let off = largest(&self.off());
+        let impulse = largest(p).max(REST * extent / h.abs() * self.node.largest_mass());
+        if off <= START_TOLERANCE * impulse || off == 0.0 {
+            return None;
+        }
+        let shares = self.node.multipliers().iter().zip(rows.lengths());
+        let shares = shares.map(|(eta, length)| (eta * length).abs()).enumerate();
+        let (row, _) = shares.fold(
+            (0, 0.0),
+            |most, one| if one.1 > most.1 { one } else { most },
+        );
+        Some((row, false, off / impulse))
+    }
+}
 
 /// The first constraint that a start violates by more than it may, relative to the size of its terms: whether by
 /// positions, and the relative violation; `None` if all hold. The rows have been evaluated at these coordinates, and
@@ -19,7 +144,7 @@ use alloc::vec::Vec;
 ///
 /// where v has only the coordinates of the constraint. Errors of a relative size `tolerance` of all positions or
 /// velocities are accepted: the tolerance of the iterations of the run allows them.
-pub(super) fn violated<M: Model>(
+fn violated<M: Model>(
     model: &M,
     (t, h): (f64, f64),
     (q, v): (&[f64], Option<&[f64]>),
