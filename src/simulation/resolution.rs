@@ -6,7 +6,7 @@ use super::kind::{Chosen, Simulated};
 use super::rounding::roundings;
 use crate::length::Length;
 use crate::motion::Warning;
-use crate::numbers::largest;
+use crate::numbers::{larger, largest};
 use std::fmt;
 use tfe_runtime::{Element, Share, Solve, Statistics};
 
@@ -361,6 +361,8 @@ impl Found {
         /// Differences below this part of the state itself are small beside the motion, or the state is at rest away
         /// from the origin.
         const SMALL: f64 = 1e-9;
+        /// Differences of so many roundings of a state are nothing else.
+        const ROUNDED: f64 = 64.0 * f64::EPSILON;
 
         for Compared { off, .. } in self.compared.iter_mut().skip(first) {
             let (of_q, of_p) = off.split_at(after[0].len());
@@ -370,6 +372,10 @@ impl Found {
                 continue;
             }
             let (q, p) = roundings();
+            let [q, p] = [
+                larger(q, ROUNDED * largest(after[0])),
+                larger(p, ROUNDED * largest(after[1])),
+            ];
             if sizes[0] <= q && sizes[1] <= p {
                 off.fill(0.0);
             }

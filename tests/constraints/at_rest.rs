@@ -150,6 +150,39 @@ fn what_loads_cannot_move_stays_at_the_origin() {
     }
 }
 
+/// A pendulum in space that hangs at rest: the momentum that its weight gives and its rod takes is all rounding errors,
+/// in runs whose elements are compared with shorter ones.
+#[test]
+fn what_hangs_at_rest_has_no_warning() {
+    #[dynamics(
+        coordinates(x, y, z),
+        lagrangian = (dot(x)^2 + dot(y)^2 + dot(z)^2)/2 - g*z,
+        constraint(rod) = x^2 + y^2 + z^2 - l^2,
+    )]
+    struct Hanging {
+        g: f64,
+        l: f64,
+    }
+    for l in [0.7, 1.0 / 3.0, 1e-6] {
+        let hanging = Hanging { g: 9.81, l };
+        let start = hanging.state([0.0, 0.0, -l], [0.0; 3]);
+        for part in [0.003, 0.01, 0.1] {
+            // The frequency is √(g/l).
+            let h = part * (l / 0.7).sqrt();
+            let simulation = Simulation::new(&hanging).step(h);
+            let run = simulation.run_linearised(start, 0.0..100.0 * h);
+            let (motion, _) = run.expect("it hangs").into_parts();
+            assert!(
+                motion.warnings().is_empty(),
+                "{l} {h}: {:?}",
+                motion.warnings()
+            );
+            let off = (motion.last().q[2] + l).abs().max(motion.last().q[0].abs());
+            assert!(off <= 1e-15 * l, "{l} {h}: {off:e}");
+        }
+    }
+}
+
 /// The solution of Aᵀ λ = b by Cramer's rule.
 fn solved(rows: [[f64; 3]; 3], b: [f64; 3]) -> [f64; 3] {
     let det = |[x, y, z]: [[f64; 3]; 3]| {
