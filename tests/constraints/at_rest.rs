@@ -1,6 +1,8 @@
 //! Mechanisms at rest at the origin of their coordinates under loads, and locked mechanisms.
 
-use crate::common::larger;
+use crate::common::{distance, larger};
+use crate::models::RodPendulum;
+use crate::runs::run;
 use tfe::constraints::tangent_basis;
 use tfe::prelude::*;
 
@@ -179,6 +181,42 @@ fn what_hangs_at_rest_has_no_warning() {
             );
             let off = (motion.last().q[2] + l).abs().max(motion.last().q[0].abs());
             assert!(off <= 1e-15 * l, "{l} {h}: {off:e}");
+        }
+    }
+}
+
+/// The momenta that weights give and rods take were divided by each other, down to 1e-120, until a run failed with numbers
+/// that are not finite.
+#[test]
+fn chains_hang_at_rest() {
+    #[dynamics(
+        coordinates(x, y, u, v),
+        lagrangian = m/2*(dot(x)^2 + dot(y)^2 + dot(u)^2 + dot(v)^2) - m*g*(y + v),
+        constraint(upper) = (x^2 + y^2 - l^2)/2,
+        constraint(lower) = (u - x)^2 + (v - y)^2 - l^2,
+    )]
+    struct Chain {
+        m: f64,
+        l: f64,
+        g: f64,
+    }
+    for l in [1.0, 0.7, 0.3, 2.1] {
+        let (m, g) = (1.3, 9.81);
+        let (rod, chain) = (RodPendulum { m, l, g }, Chain { m, l, g });
+        let rod_start = rod.state([0.0, -l], [0.0; 2]);
+        let chain_start = chain.state([0.0, -l, 0.0, -2.0 * l], [0.0; 4]);
+        for element in [3, 4, 6].map(Element::mixed) {
+            for step in [0.1, 0.05, 0.01, 0.003] {
+                let one = run(&rod, element, step, rod_start, 100.0 * step);
+                let other = run(&chain, element, step, chain_start, 100.0 * step);
+                let warnings = [one.warnings(), other.warnings()].concat();
+                assert!(warnings.is_empty(), "{l} {element} {step}: {warnings:?}");
+                let off = [
+                    distance(&one.last().q, &rod_start.q),
+                    distance(&other.last().q, &chain_start.q),
+                ];
+                assert!(worst(off) <= 4e-15 * l, "{l} {element} {step}: {off:?}");
+            }
         }
     }
 }
