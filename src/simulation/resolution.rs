@@ -170,7 +170,7 @@ where
             let at = (passed.t, passed.h);
             let roundings = || roundings::<M, N, L>(&again.model, at, passed.before);
             let found = &mut self.comparisons.found;
-            found.forgive(before, halves::<N, L>(passed.after), &roundings);
+            found.ignore_roundings(before, halves::<N, L>(passed.after), &roundings);
         }
     }
 
@@ -357,7 +357,12 @@ impl Found {
 
     /// Ignores, from the comparison of a number on, differences that are rounding errors of coordinates and momenta:
     /// where constraints hold a mechanism at rest, all its motion is.
-    fn forgive(&mut self, first: usize, after: Halves<'_>, roundings: &dyn Fn() -> (f64, f64)) {
+    fn ignore_roundings(
+        &mut self,
+        first: usize,
+        after: Halves<'_>,
+        roundings: &dyn Fn() -> (f64, f64),
+    ) {
         /// Differences below this part of the state itself are small beside the motion, or the state is at rest away
         /// from the origin.
         const SMALL: f64 = 1e-9;

@@ -166,7 +166,7 @@ fn sticking_is_told() {
     };
     let error = Simulation::new(&held)
         .accuracy(1e-6)
-        .run(held.state([1.0], [0.0]), 0.0..10.0)
+        .run(held.state([1.0], [0.0]), 0.0..1.0)
         .expect_err("sticks");
     assert!(
         !matches!(error.kind(), RunErrorKind::TooManySteps { .. }),
