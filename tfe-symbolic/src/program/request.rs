@@ -22,7 +22,8 @@ pub struct Request {
 }
 
 impl Request {
-    const NOTHING: Self = Self {
+    /// Nothing at all.
+    pub const NOTHING: Self = Self {
         value: false,
         first: false,
         mass: false,

@@ -5,13 +5,7 @@ use tfe_symbolic::program::Request;
 
 const UP_TO_FIRST: Request = Request {
     value: true,
-    first: true,
-    mass: false,
-    second: false,
-    observables: false,
-    constraint_values: false,
-    constraint_rows: false,
-    constraint_second: false,
+    ..Request::FIRST
 };
 
 #[track_caller]

@@ -15,21 +15,9 @@ pub struct Kernel {
     program: Program,
 }
 
-const NOTHING: Request = Request {
-    value: false,
-    first: false,
-    mass: false,
-    second: false,
-    observables: false,
-    constraint_values: false,
-    constraint_rows: false,
-    constraint_second: false,
-};
+const NOTHING: Request = Request::NOTHING;
 
-const FIRST: Request = Request {
-    first: true,
-    ..NOTHING
-};
+const FIRST: Request = Request::FIRST;
 
 /// All requests for which code is emitted.
 const REQUESTS: [(&str, Request, &[Array]); 8] = [
